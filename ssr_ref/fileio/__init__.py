@@ -1,0 +1,1 @@
+"""Meshes, images and bundles on disk."""

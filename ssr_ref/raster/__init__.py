@@ -1,0 +1,1 @@
+"""Rasterizing: clip, coverage, visibility, interpolation."""

@@ -1,0 +1,303 @@
+"""What is rendered: meshes in their own space, instances, materials, lights. Data only.
+
+Positions stay float32 as files hold them; a node's world transform is float64. An *object* is one
+node: one mesh instance with all its primitives.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import transforms
+from .errors import SceneError
+from .typed import F32Array, F64Array, I32Array, Rgb
+
+if TYPE_CHECKING:
+    from .camera import View
+
+SINGULAR = 1e-12
+"""A transform is singular if |det| is at most this share of the product of its column lengths."""
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """A metallic-roughness material, linear RGB.
+
+    R, the share of the reflection, is `metallic · base_color` unless `reflectivity` is given.
+    """
+
+    name: str = "material"
+    base_color: Rgb = (0.8, 0.8, 0.8)
+    metallic: float = 0.0
+    roughness: float = 0.5
+    emissive: Rgb = (0.0, 0.0, 0.0)
+    reflectivity: Rgb | None = None
+    double_sided: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Primitive:
+    """Triangles with one material.
+
+    positions (n, 3) float32 in mesh space; faces (m, 3) int32, counter-clockwise seen from
+    outside; normals (n, 3) float32 or None for flat shading; colors (n, 3) float32 linear RGB that
+    multiplies the base colour, or None.
+    """
+
+    positions: F32Array
+    faces: I32Array
+    material: int = 0
+    normals: F32Array | None = None
+    colors: F32Array | None = None
+
+    def __post_init__(self) -> None:
+        positions = _frozen(self.positions, np.float32, "positions")
+        faces = _frozen(self.faces, np.int32, "faces")
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "faces", faces)
+        if len(faces) and (faces.min() < 0 or faces.max() >= len(positions)):
+            raise SceneError(
+                f"a face refers to vertex {faces.min() if faces.min() < 0 else faces.max()} of "
+                f"{len(positions)}; expected 0 to {len(positions) - 1}: fix the indices"
+            )
+        for name in ("normals", "colors"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = _frozen(value, np.float32, name)
+            if len(array) != len(positions):
+                raise SceneError(
+                    f"{len(array)} {name} for {len(positions)} vertices; expected one for each"
+                )
+            object.__setattr__(self, name, array)
+
+
+def _frozen(value: Any, dtype: Any, name: str) -> Any:
+    """A read-only C-contiguous (n, 3) copy, so that neither side can change the other."""
+    array = np.array(value, dtype=dtype, order="C", copy=True)
+    if array.size == 0:
+        array = array.reshape(0, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise SceneError(f"{name} has shape {array.shape}; expected (n, 3)")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """A named list of primitives."""
+
+    name: str
+    primitives: tuple[Primitive, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Node:
+    """One instance of a mesh. world_from_mesh: (4, 4) float64, affine, not singular."""
+
+    name: str
+    mesh: int
+    world_from_mesh: F64Array = field(default_factory=transforms.identity)
+
+
+@dataclass(frozen=True, slots=True)
+class DirectionalLight:
+    """A light infinitely far away.
+
+    direction_ws: the way the light travels (any length). color: linear RGB radiance that a white
+    diffuse surface facing the light reflects, that is irradiance / π.
+    """
+
+    direction_ws: tuple[float, float, float]
+    color: Rgb = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Lights:
+    """Ambient radiance of a white surface (linear RGB) and directional lights."""
+
+    ambient: Rgb = (0.25, 0.25, 0.25)
+    directional: tuple[DirectionalLight, ...] = (
+        DirectionalLight((-0.5, -1.0, -0.35), (0.7, 0.7, 0.7)),
+        DirectionalLight((0.6, -0.4, -0.7), (0.2, 0.2, 0.25)),
+    )
+
+    def __post_init__(self) -> None:
+        for light in self.directional:
+            if not np.isfinite(transforms.normalized3(light.direction_ws)[0]):
+                raise SceneError(
+                    f"light direction {light.direction_ws}; expected three finite numbers, "
+                    "not all zero"
+                )
+
+    def to_json(self) -> dict[str, Any]:
+        """A dictionary that `from_json` reads back exactly."""
+        return {
+            "ambient": list(self.ambient),
+            "directional": [
+                {"direction_ws": list(light.direction_ws), "color": list(light.color)}
+                for light in self.directional
+            ],
+        }
+
+    @staticmethod
+    def from_json(data: Any) -> Lights:
+        """Lights from `to_json`'s dictionary; raises SceneError for anything else."""
+        try:
+            unknown = set(data) - {"ambient", "directional"}
+            if unknown:
+                raise SceneError(
+                    f"lights have the unknown key '{sorted(unknown)[0]}'; expected 'ambient' and "
+                    "'directional'"
+                )
+            return Lights(
+                ambient=_rgb(data["ambient"], "ambient"),
+                directional=tuple(
+                    DirectionalLight(
+                        _rgb(light["direction_ws"], "direction_ws", low=-np.inf),
+                        _rgb(light["color"], "color"),
+                    )
+                    for light in data["directional"]
+                ),
+            )
+        except (KeyError, TypeError) as error:
+            raise SceneError(
+                f"lights are incomplete ({error}); expected 'ambient': [r, g, b] and 'directional':"
+                " a list of {'direction_ws': [x, y, z], 'color': [r, g, b]}"
+            ) from None
+
+
+def _rgb(value: Any, name: str, low: float = 0.0) -> Rgb:
+    numbers = [float(v) for v in value]
+    if len(numbers) != 3 or not all(np.isfinite(v) and v >= low for v in numbers):
+        raise SceneError(f"'{name}' is {value}; expected three finite numbers, none below {low}")
+    return (numbers[0], numbers[1], numbers[2])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Everything that is drawn, with lights and the view it was made for (if any).
+
+    Raises SceneError for an index out of range, a singular transform, or no usable triangle.
+    """
+
+    meshes: tuple[Mesh, ...]
+    nodes: tuple[Node, ...]
+    materials: tuple[Material, ...] = (Material(),)
+    lights: Lights = field(default_factory=Lights)
+    view: View | None = None
+    name: str = "scene"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for mesh in self.meshes:
+            for primitive in mesh.primitives:
+                if not 0 <= primitive.material < len(self.materials):
+                    raise SceneError(
+                        f"mesh '{mesh.name}' uses material {primitive.material} of "
+                        f"{len(self.materials)}; expected 0 to {len(self.materials) - 1}"
+                    )
+        for node in self.nodes:
+            if not 0 <= node.mesh < len(self.meshes):
+                raise SceneError(
+                    f"node '{node.name}' uses mesh {node.mesh} of {len(self.meshes)}; expected 0 "
+                    f"to {len(self.meshes) - 1}"
+                )
+            _check_transform(node)
+        if self.triangle_count == 0:
+            raise SceneError(
+                f"scene '{self.name}' has no triangles; expected at least one: point clouds and "
+                "curves cannot be drawn"
+            )
+
+    @property
+    def triangle_count(self) -> int:
+        """Triangles drawn, instances counted each time."""
+        faces = [sum(len(p.faces) for p in mesh.primitives) for mesh in self.meshes]
+        return sum(faces[node.mesh] for node in self.nodes)
+
+    def world_bounds(self) -> tuple[F64Array, F64Array]:
+        """Least and greatest finite world position of any face's vertex, two (3,) arrays."""
+        low = np.full(3, np.inf)
+        high = np.full(3, -np.inf)
+        for node in self.nodes:
+            for primitive in self.meshes[node.mesh].primitives:
+                used = primitive.positions[np.unique(primitive.faces)]
+                points = np.empty((len(used), 3))
+                transforms.transform_points(node.world_from_mesh, used, points)
+                points = points[np.isfinite(points).all(axis=1)]
+                if len(points):
+                    low = np.minimum(low, points.min(axis=0))
+                    high = np.maximum(high, points.max(axis=0))
+        if not np.isfinite(low).all():
+            raise SceneError(
+                f"scene '{self.name}' has no vertex with finite coordinates (all are NaN or "
+                "infinite); expected at least one triangle that can be drawn: repair the file"
+            )
+        return low, high
+
+    def radius(self) -> float:
+        """Half the diagonal of the world bounds, rounded to a power of two (nearest in log)."""
+        low, high = self.world_bounds()
+        d = (high - low) / 2
+        r = float(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
+        if r == 0.0:
+            return 1.0
+        mantissa, exponent = np.frexp(r)
+        power = int(exponent) if mantissa * mantissa >= 0.5 else int(exponent) - 1
+        return float(np.ldexp(1.0, power))
+
+    def with_lights(self, lights: Lights) -> Scene:
+        """The same scene under other lights."""
+        return replace(self, lights=lights)
+
+    def content_sha256(self) -> str:
+        """Hash of everything that is drawn: arrays, transforms, materials, lights (not names)."""
+        digest = hashlib.sha256()
+        for node in self.nodes:
+            digest.update(np.ascontiguousarray(node.world_from_mesh, "<f8").tobytes())
+            for primitive in self.meshes[node.mesh].primitives:
+                for array in (primitive.positions, primitive.normals, primitive.colors):
+                    digest.update(b"none" if array is None else array.astype("<f4").tobytes())
+                digest.update(primitive.faces.astype("<i4").tobytes())
+                material = self.materials[primitive.material]
+                values = [
+                    material.base_color,
+                    material.metallic,
+                    material.roughness,
+                    material.emissive,
+                    material.reflectivity,
+                    material.double_sided,
+                ]
+                digest.update(json.dumps(values).encode())
+        digest.update(json.dumps(self.lights.to_json()).encode())
+        return digest.hexdigest()
+
+
+def _check_transform(node: Node) -> None:
+    m = np.array(node.world_from_mesh, np.float64)
+    if m.shape != (4, 4):
+        raise SceneError(f"node '{node.name}' has a {m.shape} transform; expected (4, 4)")
+    if not np.isfinite(m).all():
+        raise SceneError(f"node '{node.name}' has a NaN or infinite transform; expected finite")
+    if tuple(m[3]) != (0.0, 0.0, 0.0, 1.0):
+        raise SceneError(
+            f"node '{node.name}' has the last row {m[3].tolist()}; expected [0, 0, 0, 1]: only "
+            "affine transforms place a mesh"
+        )
+    columns = 1.0
+    for j in range(3):
+        columns *= float(np.sqrt(m[0, j] * m[0, j] + m[1, j] * m[1, j] + m[2, j] * m[2, j]))
+    det = transforms.determinant3(m)
+    if not abs(det) > SINGULAR * columns:
+        raise SceneError(
+            f"node '{node.name}' has a singular transform (determinant {det:.3g}); expected one "
+            "that keeps volume: remove the zero scale"
+        )
+    m.setflags(write=False)
+    object.__setattr__(node, "world_from_mesh", m)

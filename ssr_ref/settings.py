@@ -1,0 +1,204 @@
+"""Everything a user may tune, range-checked here and nowhere else.
+
+Lengths left at None are derived from the scene's radius r (a power of two): thickness 2⁻⁶ r,
+max_distance 4 r. `Settings.resolved` fills them in; the result is what a bundle records.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from .camera import check_size
+from .errors import SettingsError
+from .typed import Rgb, Size
+
+TracerName = Literal["dda", "cells"]
+ThicknessSource = Literal["back_faces", "constant"]
+IntervalName = Literal["column", "cell"]
+RefineName = Literal["auto", "rewalk", "none"]
+SelfRejection = Literal["plane", "none"]
+DistanceFade = Literal["none", "published", "linear"]
+FallbackName = Literal["none", "constant"]
+SnapName = Literal["float64", "gpu_vertices"]
+BufferDtype = Literal["float32", "float64"]
+
+THICKNESS_PER_RADIUS = 2.0**-6
+NEAR_PER_RADIUS = 2.0**-10
+MAX_DISTANCE_PER_RADIUS = 4.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Settings of one render. Raises SettingsError for a value out of range.
+
+    size : (W, H) pixels, 1 to 16384 each.
+    tracer : "dda" (one sample a stride) or "cells" (every pixel the ray crosses).
+    stride : whole pixels of the major axis between samples, 1 to 1024; DDA only.
+    jitter : start offset j in (0, 1] of a stride from a per-pixel hash; off: j = 1.
+    seed : of the jitter's hash, 0 to 2³²−1.
+    max_steps : samples tested at most; None: no limit.
+    max_distance : length of a ray in scene units, above 0, may be inf; None: 4 r.
+    bias : added to the front of the slab, scene units, ≥ 0.
+    thickness : of the slab where there is no back face, scene units, ≥ 0, may be inf; None: r/64.
+    thickness_from : "back_faces" (the same object's back face) or "constant".
+    back_any_object : the back face of any object, as a GPU's back-face buffer holds it.
+    interval : "column" (half a stride either side) or "cell" (clamped to the pixel read).
+    refine : "rewalk" every cell of a candidate's interval, "none"; "auto": rewalk above stride 1.
+    self_rejection : "plane" refuses hits under the origin's tangent plane; "none".
+    edge_fade : whether confidence falls towards the image's border; edge_power its exponent.
+    distance_fade : "none", "published" 0.75^(length/max) or "linear".
+    fresnel : Schlick's term, with f0 = 0.04 for dielectrics.
+    fallback : what a miss shows: "none" (0) or "constant" (fallback_color, linear RGB).
+    max_roughness : rougher pixels do not reflect.
+    snap : "float64" window coordinates, or "gpu_vertices": float32 as a GPU computes them.
+    buffer_dtype : of the G-buffer, "float32" (rounded once) or "float64".
+    """
+
+    size: Size = (960, 540)
+    tracer: TracerName = "dda"
+    stride: int = 1
+    jitter: bool = False
+    seed: int = 0
+    max_steps: int | None = None
+    max_distance: float | None = None
+    bias: float = 0.0
+    thickness: float | None = None
+    thickness_from: ThicknessSource = "back_faces"
+    back_any_object: bool = False
+    interval: IntervalName = "column"
+    refine: RefineName = "auto"
+    self_rejection: SelfRejection = "plane"
+    edge_fade: bool = True
+    edge_power: float = 3.0
+    distance_fade: DistanceFade = "none"
+    fresnel: bool = False
+    fallback: FallbackName = "none"
+    fallback_color: Rgb = (0.0, 0.0, 0.0)
+    max_roughness: float = 0.5
+    snap: SnapName = "float64"
+    buffer_dtype: BufferDtype = "float32"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", check_size(self.size))
+        _check_choices(self)
+        _whole(self, "stride", 1, 1024)
+        _whole(self, "seed", 0, 2**32 - 1)
+        if self.max_steps is not None:
+            _whole(self, "max_steps", 1, 2**31 - 1)
+        _number(self, "max_distance", above=0.0, inf=True)
+        _number(self, "bias", least=0.0)
+        _number(self, "thickness", least=0.0, inf=True)
+        _number(self, "edge_power", above=0.0)
+        _number(self, "max_roughness", least=0.0)
+        color = tuple(float(v) for v in self.fallback_color)
+        if len(color) != 3 or not all(np.isfinite(v) and v >= 0.0 for v in color):
+            raise SettingsError(
+                f"fallback_color is {self.fallback_color}; expected three finite numbers, none "
+                "below 0"
+            )
+        object.__setattr__(self, "fallback_color", color)
+
+    @property
+    def refines(self) -> bool:
+        """Whether candidates are re-walked cell by cell."""
+        return self.tracer == "dda" and (
+            self.refine == "rewalk" or (self.refine == "auto" and self.stride > 1)
+        )
+
+    def resolved(self, radius: float) -> Settings:
+        """The same settings with every default length filled in from the scene's radius."""
+        return replace(
+            self,
+            thickness=THICKNESS_PER_RADIUS * radius if self.thickness is None else self.thickness,
+            max_distance=(
+                MAX_DISTANCE_PER_RADIUS * radius if self.max_distance is None else self.max_distance
+            ),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """A dictionary of JSON values; infinite lengths are the string "inf"."""
+        return {
+            key: "inf" if isinstance(value, float) and np.isinf(value) else value
+            for key, value in asdict(self).items()
+        }
+
+    @staticmethod
+    def from_json(data: Any) -> Settings:
+        """Settings from `to_json`'s dictionary; raises SettingsError naming an unknown key."""
+        names = {f.name for f in fields(Settings)}
+        if not isinstance(data, dict):
+            raise SettingsError(f"settings are a {type(data).__name__}; expected a JSON object")
+        unknown = sorted(set(data) - names)
+        if unknown:
+            raise SettingsError(
+                f"unknown setting '{unknown[0]}'; expected some of {', '.join(sorted(names))}"
+            )
+        values = {key: np.inf if value == "inf" else value for key, value in data.items()}
+        try:
+            return Settings(**values)
+        except TypeError as error:
+            raise SettingsError(f"settings cannot be read: {error}") from None
+
+
+_CHOICES: dict[str, tuple[Any, ...]] = {
+    "tracer": get_args(TracerName),
+    "thickness_from": get_args(ThicknessSource),
+    "interval": get_args(IntervalName),
+    "refine": get_args(RefineName),
+    "self_rejection": get_args(SelfRejection),
+    "distance_fade": get_args(DistanceFade),
+    "fallback": get_args(FallbackName),
+    "snap": get_args(SnapName),
+    "buffer_dtype": get_args(BufferDtype),
+    "jitter": (True, False),
+    "back_any_object": (True, False),
+    "edge_fade": (True, False),
+    "fresnel": (True, False),
+}
+
+
+def _check_choices(settings: Settings) -> None:
+    for name, choices in _CHOICES.items():
+        value = getattr(settings, name)
+        if value not in choices or (isinstance(choices[0], bool) and not isinstance(value, bool)):
+            listed = ", ".join(str(c) for c in choices)
+            raise SettingsError(f"{name} is {value!r}; expected one of {listed}")
+
+
+def _whole(settings: Settings, name: str, low: int, high: int) -> None:
+    value = getattr(settings, name)
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise SettingsError(f"{name} is {value!r}; expected a whole number")
+    if not low <= value <= high:
+        raise SettingsError(f"{name} is {value}; expected {low} to {high}")
+    object.__setattr__(settings, name, int(value))
+
+
+def _number(
+    settings: Settings,
+    name: str,
+    *,
+    least: float | None = None,
+    above: float | None = None,
+    inf: bool = False,
+) -> None:
+    value = getattr(settings, name)
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+        raise SettingsError(f"{name} is {value!r}; expected a number")
+    number = float(value)
+    good = not np.isnan(number) and (inf or np.isfinite(number))
+    if least is not None:
+        good = good and number >= least
+    if above is not None:
+        good = good and number > above
+    if not good:
+        bound = f"above {above:g}" if above is not None else f"at least {least:g}"
+        raise SettingsError(
+            f"{name} is {number:g}; expected {bound}" + (" (inf allowed)" if inf else ", finite")
+        )
+    object.__setattr__(settings, name, number)

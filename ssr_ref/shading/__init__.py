@@ -1,0 +1,1 @@
+"""Diffuse radiance of visible surfaces."""

@@ -1,0 +1,1 @@
+"""Screen-space tracers: rays, hit rule, walks, fades, composite."""

@@ -1,0 +1,1 @@
+"""Scalar kernels: vectors, exact products, elementary functions, noise."""
