@@ -43,22 +43,32 @@ class ViewParams(NamedTuple):
     cy: float
     near: float
     far: float
-    eye: Vec3  # world space
-    right: Vec3  # the view axes in world space: the columns of world_from_view
-    up: Vec3
-    back: Vec3
+    # The columns of world_from_view: right, up, back, eye. Scalars, because a parallel loop can
+    # take a tuple of numbers but not a tuple of tuples.
+    right_x: float
+    right_y: float
+    right_z: float
+    up_x: float
+    up_y: float
+    up_z: float
+    back_x: float
+    back_y: float
+    back_z: float
+    eye_x: float
+    eye_y: float
+    eye_z: float
 
 
 @kernel
 def to_view(view: ViewParams, p_ws: Vec3) -> Vec3:
     """R·(p − eye): subtract, then rotate, so a scene moved on its grid keeps every bit."""
-    x = p_ws.x - view.eye.x
-    y = p_ws.y - view.eye.y
-    z = p_ws.z - view.eye.z
+    x = p_ws.x - view.eye_x
+    y = p_ws.y - view.eye_y
+    z = p_ws.z - view.eye_z
     return Vec3(
-        view.right.x * x + view.right.y * y + view.right.z * z,
-        view.up.x * x + view.up.y * y + view.up.z * z,
-        view.back.x * x + view.back.y * y + view.back.z * z,
+        view.right_x * x + view.right_y * y + view.right_z * z,
+        view.up_x * x + view.up_y * y + view.up_z * z,
+        view.back_x * x + view.back_y * y + view.back_z * z,
     )
 
 
@@ -66,9 +76,9 @@ def to_view(view: ViewParams, p_ws: Vec3) -> Vec3:
 def rotate_to_view(view: ViewParams, d_ws: Vec3) -> Vec3:
     """A direction from world to view space."""
     return Vec3(
-        view.right.x * d_ws.x + view.right.y * d_ws.y + view.right.z * d_ws.z,
-        view.up.x * d_ws.x + view.up.y * d_ws.y + view.up.z * d_ws.z,
-        view.back.x * d_ws.x + view.back.y * d_ws.y + view.back.z * d_ws.z,
+        view.right_x * d_ws.x + view.right_y * d_ws.y + view.right_z * d_ws.z,
+        view.up_x * d_ws.x + view.up_y * d_ws.y + view.up_z * d_ws.z,
+        view.back_x * d_ws.x + view.back_y * d_ws.y + view.back_z * d_ws.z,
     )
 
 
@@ -285,7 +295,11 @@ class Camera:
         offset_x = float(m[0, 2] if persp else m[0, 3])
         offset_y = float(m[1, 2] if persp else m[1, 3])
         sign = -1.0 if persp else 1.0
-        axes = [Vec3(*(float(world[i, j]) for i in range(3))) for j in range(4)]
+        columns = {
+            f"{name}_{axis}": float(world[i, j])
+            for j, name in enumerate(("right", "up", "back", "eye"))
+            for i, axis in enumerate("xyz")
+        }
         return ViewParams(
             perspective=persp,
             width=width,
@@ -300,10 +314,7 @@ class Camera:
             cy=half_h - sign * half_h * offset_y,
             near=self.near,
             far=self.far,
-            right=axes[0],
-            up=axes[1],
-            back=axes[2],
-            eye=axes[3],
+            **columns,
         )
 
     def to_json(self) -> dict[str, Any]:

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from .buffers import GBuffer, HitBuffer, Resolved
-from .camera import Camera
+from .camera import Camera, View, ViewParams
+from .raster.geometry import Geometry, flatten
+from .raster.rasterize import RasterOptions, rasterize
 from .scene import Scene
-from .settings import Settings
+from .scenes import framed_view
+from .settings import NEAR_PER_RADIUS, Settings
+from .shading.diffuse import light_arrays, shade_radiance
+from .ssr.resolve import resolve
+from .ssr.trace import trace
 
 Progress = Callable[[str, float], None]
 """Called with a stage's name and the share of it that is done, 0 to 1."""
@@ -29,3 +38,152 @@ class Frame:
     resolved: Resolved
     warnings: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
+
+
+def render(
+    scene: Scene,
+    camera: Camera | View | None = None,
+    settings: Settings | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Frame:
+    """Rasterize a scene, trace its reflections, composite.
+
+    camera: a `Camera`, or a `View` that becomes one; None: the scene's own view, or one framed on
+    its bounds. settings: None: the defaults. progress: called with stage and share done.
+    Raises SceneError, CameraError or SettingsError.
+    """
+    stages = _Stages(progress)
+    settings = settings or Settings()
+
+    with stages("geometry"):
+        radius = scene.radius()
+        settings = settings.resolved(radius)
+        camera = make_camera(scene, camera, settings, radius)
+        view = camera.params(settings.size)
+        geometry = flatten(scene)
+    with stages("raster"):
+        gbuffer, positions_vs = rasterize(view, geometry, raster_options(settings))
+    with stages("radiance"):
+        gbuffer = with_radiance(view, geometry, positions_vs, gbuffer, scene)
+    with stages("trace"):
+        hits = trace(view, gbuffer, settings, stages.within("trace"))
+    with stages("resolve"):
+        resolved = resolve(view, gbuffer, hits, settings)
+    return Frame(
+        scene=scene,
+        camera=camera,
+        settings=settings,
+        gbuffer=gbuffer,
+        hits=hits,
+        resolved=resolved,
+        warnings=(*scene.notes, *frame_warnings(scene, geometry, gbuffer, settings)),
+        timings=stages.seconds,
+    )
+
+
+def make_camera(
+    scene: Scene, camera: Camera | View | None, settings: Settings, radius: float
+) -> Camera:
+    """The camera to use; a view's missing near plane is 2⁻¹⁰ of the scene's radius."""
+    if isinstance(camera, Camera):
+        return camera
+    view = camera or scene.view or framed_view(scene)
+    return view.camera(settings.size, NEAR_PER_RADIUS * radius)
+
+
+def raster_options(settings: Settings) -> RasterOptions:
+    """What the rasterizer must produce for these settings."""
+    return RasterOptions(
+        back_depth=settings.thickness_from == "back_faces",
+        back_any_object=settings.back_any_object,
+        fresnel=settings.fresnel,
+        max_roughness=settings.max_roughness,
+        gpu_vertices=settings.snap == "gpu_vertices",
+        dtype=np.float64 if settings.buffer_dtype == "float64" else np.float32,
+    )
+
+
+def with_radiance(
+    view: ViewParams, geometry: Geometry, positions_vs: np.ndarray, gbuffer: GBuffer, scene: Scene
+) -> GBuffer:
+    """The G-buffer with its radiance image."""
+    radiance = np.empty((*gbuffer.depth.shape, 3), gbuffer.depth.dtype)
+    shade_radiance(
+        view,
+        geometry,
+        positions_vs,
+        gbuffer.triangle_id,
+        light_arrays(scene.lights),
+        radiance,
+    )
+    return replace(gbuffer, radiance=radiance)
+
+
+def frame_warnings(
+    scene: Scene, geometry: Geometry, gbuffer: GBuffer, settings: Settings
+) -> list[str]:
+    """What the reader of a valid picture must still know."""
+    lines: list[str] = []
+    counts = gbuffer.counts
+    seen = gbuffer.triangle_id >= 0
+    if not seen.any():
+        lines.append("the view is empty: no triangle covers a pixel centre")
+    if counts.non_finite:
+        lines.append(
+            f"{counts.non_finite} of {counts.triangles} triangles have NaN or infinite vertices "
+            "and were not drawn"
+        )
+    if counts.repaired_normals:
+        lines.append(
+            f"{counts.repaired_normals} pixels have a zero or non-finite shading normal; the "
+            "geometric normal was used"
+        )
+    if seen.any() and gbuffer.material_id is not None:
+        visible = np.unique(gbuffer.material_id[seen])
+        reflective = geometry.metallic[visible] > 0.0
+        reflective |= np.nan_to_num(geometry.own_reflectivity[visible]).max(axis=1) > 0.0
+        rough = reflective & (geometry.roughness[visible] > settings.max_roughness)
+        blurred = reflective & ~rough & (geometry.roughness[visible] > 0.0)
+        if rough.any():
+            lines.append(
+                f"{int(rough.sum())} visible materials are rougher than max_roughness "
+                f"{settings.max_roughness:g} and do not reflect"
+            )
+        if blurred.any():
+            lines.append(
+                f"{int(blurred.sum())} visible materials have a roughness above 0; their "
+                "reflection is drawn sharp"
+            )
+    return lines
+
+
+class _Stages:
+    """Times each stage and tells progress about it."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.seconds: dict[str, float] = {}
+        self._progress = progress
+        self._name = ""
+        self._start = 0.0
+
+    def __call__(self, name: str) -> _Stages:
+        self._name = name
+        return self
+
+    def __enter__(self) -> None:
+        self._start = time.perf_counter()
+        if self._progress is not None:
+            self._progress(self._name, 0.0)
+
+    def __exit__(self, *exc: object) -> None:
+        self.seconds[self._name] = time.perf_counter() - self._start
+        if self._progress is not None:
+            self._progress(self._name, 1.0)
+
+    def within(self, name: str) -> Callable[[float], None] | None:
+        """A callback for the share done inside a stage, or None if nobody listens."""
+        if self._progress is None:
+            return None
+        progress = self._progress
+        return lambda share: progress(name, share)

@@ -136,7 +136,7 @@ class Settings:
             raise SettingsError(
                 f"unknown setting '{unknown[0]}'; expected some of {', '.join(sorted(names))}"
             )
-        values = {key: np.inf if value == "inf" else value for key, value in data.items()}
+        values: dict[str, Any] = {k: np.inf if v == "inf" else v for k, v in data.items()}
         try:
             return Settings(**values)
         except TypeError as error:

@@ -1,0 +1,151 @@
+"""The surface at a pixel: the triangle's plane in view space, and barycentrics on it.
+
+The plane is that of the unclipped float64 triangle. *Nearness* is k = 1/depth (perspective) or
+−depth (orthographic): affine in the pixel for both, and larger is nearer.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .._jit import kernel
+from ..camera import ViewParams, point_at
+from ..typed import F64Array
+from ..vecmath.vec import Vec3, cross, dot, sub
+
+
+class NearnessPlane(NamedTuple):
+    """Nearness (c + b·y) + a·x at the centre of pixel (x, y)."""
+
+    a: float
+    b: float
+    c: float
+
+
+@kernel
+def load(points: F64Array, i: int) -> Vec3:
+    """Row i of an (n, 3) array."""
+    return Vec3(points[i, 0], points[i, 1], points[i, 2])
+
+
+@kernel
+def nearness_of_depth(view: ViewParams, depth: float) -> float:
+    """k of a view depth."""
+    return 1.0 / depth if view.perspective else -depth
+
+
+@kernel
+def depth_of_nearness(view: ViewParams, k: float) -> float:
+    """View depth of k."""
+    return 1.0 / k if view.perspective else -k
+
+
+@kernel
+def plane_normal(v0: Vec3, v1: Vec3, v2: Vec3) -> Vec3:
+    """Normal of the counter-clockwise triangle, length twice its area."""
+    return cross(sub(v1, v0), sub(v2, v0))
+
+
+@kernel
+def nearest_vertex(view: ViewParams, v0: Vec3, v1: Vec3, v2: Vec3) -> Vec3:
+    """The vertex nearest the eye (orthographic: of least depth); ties to the first."""
+    if view.perspective:
+        d0, d1, d2 = dot(v0, v0), dot(v1, v1), dot(v2, v2)
+    else:
+        d0, d1, d2 = -v0.z, -v1.z, -v2.z
+    if d1 < d0:
+        return v2 if d2 < d1 else v1
+    return v2 if d2 < d0 else v0
+
+
+@kernel
+def nearness_plane(view: ViewParams, v0: Vec3, v1: Vec3, v2: Vec3) -> NearnessPlane:
+    """k = (n·d)/(n·v_a) as an affine function of the pixel (orthographic: −depth).
+
+    A triangle seen exactly edge-on has no such function: it gets its nearest vertex's k.
+    """
+    n = plane_normal(v0, v1, v2)
+    va = nearest_vertex(view, v0, v1, v2)
+    x0 = (0.5 - view.cx) / view.fx
+    y0 = (view.cy - 0.5) / view.fy
+    if view.perspective:
+        scale = dot(n, va)
+        a = n.x / view.fx / scale
+        b = -n.y / view.fy / scale
+        c = (n.x * x0 + n.y * y0 - n.z) / scale
+    else:
+        a = -(n.x / view.fx / n.z)
+        b = n.y / view.fy / n.z
+        c = va.z - (n.x * (x0 - va.x) + n.y * (y0 - va.y)) / n.z
+    if np.isfinite(a) and np.isfinite(b) and np.isfinite(c):
+        return NearnessPlane(a, b, c)
+    depth = min(-v0.z, -v1.z, -v2.z)
+    if view.perspective and not depth > view.near:
+        depth = view.near
+    return NearnessPlane(0.0, 0.0, nearness_of_depth(view, depth))
+
+
+@kernel
+def nearness_at(plane: NearnessPlane, x: int, y: int) -> float:
+    """k at the centre of pixel (x, y), from absolute indices, so no tiling can change it."""
+    return (plane.c + plane.b * y) + plane.a * x
+
+
+class Barycentric(NamedTuple):
+    """Weights of the three vertices, each ≥ 0, sum 1 to rounding."""
+
+    b0: float
+    b1: float
+    b2: float
+
+
+class BarycentricFrame(NamedTuple):
+    """Dual vectors: weight i of point p is dual_i·(p − v0), i = 1, 2."""
+
+    v0: Vec3
+    dual1: Vec3
+    dual2: Vec3
+
+
+@kernel
+def barycentric_frame(v0: Vec3, v1: Vec3, v2: Vec3) -> BarycentricFrame:
+    """Set-up of `barycentric_at`; a triangle without area gives zero duals (vertex 0 alone)."""
+    n = plane_normal(v0, v1, v2)
+    nn = dot(n, n)
+    if not nn > 0.0:
+        return BarycentricFrame(v0, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
+    d1 = cross(sub(v2, v0), n)
+    d2 = cross(n, sub(v1, v0))
+    return BarycentricFrame(
+        v0, Vec3(d1.x / nn, d1.y / nn, d1.z / nn), Vec3(d2.x / nn, d2.y / nn, d2.z / nn)
+    )
+
+
+@kernel
+def barycentric_at(frame: BarycentricFrame, p: Vec3) -> Barycentric:
+    """Weights of a point on the plane: perspective-correct, since p is the point in space.
+
+    Snapping lets a covered centre lie just outside the true triangle: weights are clamped to ≥ 0
+    and divided by their sum.
+    """
+    r = sub(p, frame.v0)
+    b1 = dot(frame.dual1, r)
+    b2 = dot(frame.dual2, r)
+    if not b1 > 0.0:
+        b1 = 0.0
+    if not b2 > 0.0:
+        b2 = 0.0
+    b0 = 1.0 - b1 - b2
+    if not b0 > 0.0:
+        b0 = 0.0
+    total = b0 + b1 + b2
+    if not np.isfinite(total):
+        return Barycentric(1.0, 0.0, 0.0)
+    return Barycentric(b0 / total, b1 / total, b2 / total)
+
+
+@kernel
+def surface_point(view: ViewParams, plane: NearnessPlane, x: int, y: int) -> Vec3:
+    """View-space point of the plane at the centre of pixel (x, y)."""
+    depth = depth_of_nearness(view, nearness_at(plane, x, y))
+    return point_at(view, x + 0.5, y + 0.5, depth)
