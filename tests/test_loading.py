@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import copy
 import json
+import logging
 import os
 import random
 import struct
@@ -586,6 +587,16 @@ def test_bad_file_is_one_silent_line(tmp_path, name, capfd, caplog, recwarn):
     assert not recwarn.list
 
 
+def test_trimesh_is_silenced_and_then_as_before(caplog, capfd):
+    logger = logging.getLogger("trimesh")
+    with meshes_module._strict_and_silent():
+        logger.error("unheard")
+    assert not caplog.records
+    logger.error("heard")
+    assert [record.message for record in caplog.records] == ["heard"]
+    assert capfd.readouterr().out == ""
+
+
 @pytest.mark.parametrize("ext", [*FORMATS, ".xyz"])
 def test_missing_directory_and_unreadable(tmp_path, ext, monkeypatch):
     path = tmp_path / f"a{ext}"
@@ -941,6 +952,11 @@ def test_scene_glb_gives_back_the_same_content(tmp_path):
     assert again.with_lights(lit.lights).content_sha256() == lit.content_sha256()
     assert [n.name for n in again.nodes] == ["a", "b", "c"]
     assert [m.name for m in again.materials] == ["ε", "lamp", "material"]
+    # glTF allows emissive factors up to 1; more needs the strength extension.
+    data = path.read_bytes()
+    root = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    assert max(max(m["emissiveFactor"]) for m in root["materials"]) <= 1.0
+    assert root["extensionsUsed"] == ["KHR_materials_emissive_strength"]
     # The hash sees the last bit of a vertex and of a matrix.
     bumped = np.nextafter(scene.nodes[0].world_from_mesh, np.inf)
     bumped[3] = (0, 0, 0, 1)

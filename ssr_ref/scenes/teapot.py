@@ -77,7 +77,8 @@ def pot(tessellation: int, *, material: int = 0) -> tuple[Primitive, ...]:
     """Body with rim and bottom, lid, handle, spout: y up, spout towards +x, lowest point y = 0.
 
     Each part is watertight but for these open ends of Newell's data: the rim's inner edge, the
-    lid's edge, both roots and the spout's lip (4, 4, 2 + 2 and 2 + 2 times n edges). At tessellation 1 handle and spout are flat.
+    lid's edge, both roots and the spout's lip (4, 4, 2 + 2 and 2 + 2 times n edges).
+    At tessellation 1 handle and spout are flat.
     """
     return tuple(_part(name, tessellation, material) for name in teapot_patches.PARTS)
 
