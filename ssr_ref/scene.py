@@ -24,6 +24,14 @@ SINGULAR = 1e-12
 """A transform is singular if |det| is at most this share of the product of its column lengths."""
 
 
+def _rgb(value: Any, name: str, low: float = 0.0) -> Rgb:
+    numbers = [float(v) for v in value]
+    if len(numbers) != 3 or not all(np.isfinite(v) and v >= low for v in numbers):
+        bound = "" if low == -np.inf else f", none below {low:g}"
+        raise SceneError(f"{name} is {value}; expected three finite numbers{bound}")
+    return (numbers[0], numbers[1], numbers[2])
+
+
 @dataclass(frozen=True, slots=True)
 class Material:
     """A metallic-roughness material, linear RGB.
@@ -38,6 +46,21 @@ class Material:
     emissive: Rgb = (0.0, 0.0, 0.0)
     reflectivity: Rgb | None = None
     double_sided: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("base_color", "emissive", "reflectivity"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _rgb(value, f"{self.name}: {name}"))
+        for name in ("metallic", "roughness"):
+            number = float(getattr(self, name))
+            if not (np.isfinite(number) and number >= 0.0):
+                raise SceneError(
+                    f"material '{self.name}' has {name} {number:g}; expected a finite number of 0 "
+                    "or more"
+                )
+            object.__setattr__(self, name, number)
+        object.__setattr__(self, "double_sided", bool(self.double_sided))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,6 +139,15 @@ class DirectionalLight:
     direction_ws: tuple[float, float, float]
     color: Rgb = (1.0, 1.0, 1.0)
 
+    def __post_init__(self) -> None:
+        direction = _rgb(self.direction_ws, "light direction", low=-np.inf)
+        if not np.isfinite(transforms.normalized3(direction)[0]):
+            raise SceneError(
+                f"light direction {self.direction_ws}; expected three finite numbers, not all zero"
+            )
+        object.__setattr__(self, "direction_ws", direction)
+        object.__setattr__(self, "color", _rgb(self.color, "light color"))
+
 
 @dataclass(frozen=True, slots=True)
 class Lights:
@@ -128,12 +160,7 @@ class Lights:
     )
 
     def __post_init__(self) -> None:
-        for light in self.directional:
-            if not np.isfinite(transforms.normalized3(light.direction_ws)[0]):
-                raise SceneError(
-                    f"light direction {light.direction_ws}; expected three finite numbers, "
-                    "not all zero"
-                )
+        object.__setattr__(self, "ambient", _rgb(self.ambient, "ambient"))
 
     def to_json(self) -> dict[str, Any]:
         """A dictionary that `from_json` reads back exactly."""
@@ -156,12 +183,9 @@ class Lights:
                     "'directional'"
                 )
             return Lights(
-                ambient=_rgb(data["ambient"], "ambient"),
+                ambient=data["ambient"],
                 directional=tuple(
-                    DirectionalLight(
-                        _rgb(light["direction_ws"], "direction_ws", low=-np.inf),
-                        _rgb(light["color"], "color"),
-                    )
+                    DirectionalLight(light["direction_ws"], light["color"])
                     for light in data["directional"]
                 ),
             )
@@ -170,13 +194,6 @@ class Lights:
                 f"lights are incomplete ({error}); expected 'ambient': [r, g, b] and 'directional':"
                 " a list of {'direction_ws': [x, y, z], 'color': [r, g, b]}"
             ) from None
-
-
-def _rgb(value: Any, name: str, low: float = 0.0) -> Rgb:
-    numbers = [float(v) for v in value]
-    if len(numbers) != 3 or not all(np.isfinite(v) and v >= low for v in numbers):
-        raise SceneError(f"'{name}' is {value}; expected three finite numbers, none below {low}")
-    return (numbers[0], numbers[1], numbers[2])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
