@@ -179,7 +179,7 @@ def test_render_writes_a_bundle_and_reports(folder, rendered, capsys):
 
 
 def test_quiet_prints_only_warnings(folder, rendered, capsys):
-    assert run_line("render triangle.obj -o out --quiet") == 0
+    assert run_line("render triangle.obj -o out --quiet --no-previews") == 0
     assert capsys.readouterr() == ("", "warning: made-up buffers\n")
 
 
@@ -208,7 +208,7 @@ def test_default_size(folder, rendered):
 def test_options_win_over_the_settings_file(folder, rendered):
     given = Settings(size=(9, 7), stride=4, jitter=True, fresnel=True, max_distance=3.0)
     (folder / "s.json").write_text(json.dumps(given.to_json()))
-    line = "render triangle.obj -o out --settings s.json --stride 2 --no-jitter --max-distance inf"
+    line = "render triangle.obj -o out --settings s.json --stride 2 --no-jitter --max-distance inf --no-previews"
     assert run_line(line) == 0
     assert rendered[0][2] == replace(given, stride=2, jitter=False, max_distance=np.inf)
 
@@ -219,7 +219,7 @@ def test_every_setting_can_be_given(folder, rendered):
         "--max-steps 99 --max-distance 2.5 --bias 0.25 --thickness 0.5 --thickness-from constant "
         "--back-any-object --interval cell --refine none --self-rejection none --no-edge-fade "
         "--edge-power 2 --distance-fade linear --fresnel --fallback-color 0.1,0.2,0.3 "
-        "--max-roughness 0.75 --snap gpu_vertices --buffer-dtype float64"
+        "--max-roughness 0.75 --snap gpu_vertices --buffer-dtype float64 --no-previews"
     )
     assert run_line(line) == 0
     assert rendered[0][2] == Settings(
@@ -242,16 +242,18 @@ def test_scene_options_reach_the_loader(folder, rendered, monkeypatch):
         return made_up_frame().scene
 
     monkeypatch.setattr("ssr_ref.fileio.load.load", load)
-    run_line("render teapot -o out --mirror-floor --normals smooth --tessellation 5")
+    run_line("render teapot -o out --mirror-floor --normals smooth --tessellation 5 --no-previews")
     assert asked == [("teapot", {"normals": "smooth", "mirror_floor": True, "tessellation": 5})]
 
 
 def test_lens_options_change_the_scenes_view(folder, rendered):
     (folder / "view.json").write_text('{"eye": [1, 2, 9], "target": [0, 0, 0], "far": 50}')
-    assert run_line("render triangle.obj -o a --fov 70 --near 0.5") == 0
-    assert run_line("render triangle.obj -o b --camera view.json --orthographic 3") == 0
-    assert run_line("render triangle.obj -o c --camera view.json --far 20") == 0
-    assert run_line("render triangle.obj -o d") == 0
+    assert run_line("render triangle.obj -o a --fov 70 --near 0.5 --no-previews") == 0
+    assert (
+        run_line("render triangle.obj -o b --camera view.json --orthographic 3 --no-previews") == 0
+    )
+    assert run_line("render triangle.obj -o c --camera view.json --far 20 --no-previews") == 0
+    assert run_line("render triangle.obj -o d --no-previews") == 0
     views = [camera for _, camera, _ in rendered]
     assert (views[0].fov_y_degrees, views[0].near) == (70, 0.5)
     assert views[1] == View((1, 2, 9), (0, 0, 0), far=50, orthographic_height=3)
@@ -261,10 +263,15 @@ def test_lens_options_change_the_scenes_view(folder, rendered):
 
 
 def test_a_bundle_renders_again_from_its_own_files(folder, rendered):
-    assert run_line("render triangle.obj -o a --size 9x7 --fov 50 --mirror-floor --bias 0.01") == 0
+    assert (
+        run_line(
+            "render triangle.obj -o a --size 9x7 --fov 50 --mirror-floor --bias 0.01 --no-previews"
+        )
+        == 0
+    )
     again = (
         "render a/scene.glb -o b --camera a/camera.json --lights a/lights.json "
-        "--settings a/settings.json"
+        "--settings a/settings.json --no-previews"
     )
     assert run_line(again) == 0
     first, second = load_bundle("a").manifest, load_bundle("b").manifest
@@ -440,7 +447,7 @@ def test_warnings_are_one_line_each_and_told_once(folder, monkeypatch, capsys):
         return replace(made_up_render(*args, **kwargs), warnings=("second", "third"))
 
     monkeypatch.setattr("ssr_ref.pipeline.render", render, raising=False)
-    assert run_line("render triangle.obj -o out --quiet") == 0
+    assert run_line("render triangle.obj -o out --quiet --no-previews") == 0
     lines = capsys.readouterr().err.splitlines()
     assert lines == [f"warning: {t}" for t in ("first of two lines", "second", "third")]
     assert load_bundle("out").manifest["warnings"] == ["second", "third"]
@@ -610,3 +617,25 @@ def test_the_bar_appears_after_its_patience_and_goes_again(monkeypatch):
     with Output().progress() as bar:
         bar("trace", 0.25)
     assert quick.getvalue() == ""
+
+
+# The whole of it
+
+
+@pytest.mark.slow  # compiles every kernel
+def test_a_real_golden_repeats_and_renders_again_from_its_files(folder, capsys):
+    first = "render poles -o a --size 37x23 --mirror-floor --stride 2 --jitter --tessellation 4"
+    assert run_line(first) == 0
+    assert run_line(first.replace("-o a", "-o b")) == 0
+    again = (
+        "render a/scene.glb -o c --camera a/camera.json --lights a/lights.json "
+        "--settings a/settings.json --no-previews"
+    )
+    assert run_line(again) == 0
+    a, b, c = (load_bundle(name) for name in "abc")
+    assert a.manifest == b.manifest
+    assert c.manifest["content_sha256"] == a.manifest["content_sha256"]
+    assert c.scene.content_sha256() == a.scene.content_sha256()
+    assert a.manifest["statistics"]["hits"] > 50
+    assert run_line("render a/scene.glb -o d --size 37x23 --bias 0.5 --no-previews") == 0
+    assert load_bundle("d").manifest["content_sha256"] != a.manifest["content_sha256"]
