@@ -114,10 +114,11 @@ def _invoke(argv: list[str]) -> int:
 
 def _usage_message(error: Any, argv: Sequence[str]) -> str:
     """Typer's message, which does not say what it found in an option: look it up."""
-    message = str(error.format_message()).strip().rstrip(".") + "."
+    message = str(error.format_message()).strip()
+    message += "" if message.endswith((".", "?")) else "."
     names = tuple(getattr(getattr(error, "param", None), "opts", ()))
     for word, value in pairwise(argv):
-        if word in names and value not in message:
+        if word in names and f"'{value}'" not in message:
             return f"{word} is '{value}'. {message}"
     return message
 

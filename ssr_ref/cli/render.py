@@ -18,7 +18,7 @@ from .output import Output, length, percent
 
 if TYPE_CHECKING:
     from ..camera import Camera, View
-    from ..fileio.load import NormalsName
+    from ..fileio.meshes import NormalsName
     from ..pipeline import Frame
     from ..scene import Scene
     from ..settings import Settings

@@ -1,0 +1,1 @@
+"""Oracles: slow, obvious, exact, and independent of the package that they judge."""
