@@ -129,12 +129,19 @@ class _PackageCache(FunctionCache):  # type: ignore[misc]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # a truncated or foreign file: compile again
+        except Exception:  # a truncated or foreign file: forget the index and compile again
+            self._empty_index()
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
             super().save_overload(sig, data)
+        except OSError:  # a full disk or a folder that went away
+            self.disable()
+
+    def _empty_index(self) -> None:
+        try:
+            self.flush()
         except OSError:
             self.disable()
 

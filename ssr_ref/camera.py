@@ -41,6 +41,8 @@ class ViewParams(NamedTuple):
     fy: float
     cx: float  # pixel coordinates of the view axis
     cy: float
+    inverse_fx: float  # 1/fx
+    inverse_fy: float
     near: float
     far: float
     # The columns of world_from_view: right, up, back, eye. Scalars, because a parallel loop can
@@ -295,6 +297,7 @@ class Camera:
         offset_x = float(m[0, 2] if persp else m[0, 3])
         offset_y = float(m[1, 2] if persp else m[1, 3])
         sign = -1.0 if persp else 1.0
+        fx, fy = half_w * float(m[0, 0]), half_h * float(m[1, 1])
         columns = {
             f"{name}_{axis}": float(world[i, j])
             for j, name in enumerate(("right", "up", "back", "eye"))
@@ -308,10 +311,12 @@ class Camera:
             p11=float(m[1, 1]),
             offset_x=offset_x,
             offset_y=offset_y,
-            fx=half_w * float(m[0, 0]),
-            fy=half_h * float(m[1, 1]),
+            fx=fx,
+            fy=fy,
             cx=half_w + sign * half_w * offset_x,
             cy=half_h - sign * half_h * offset_y,
+            inverse_fx=1.0 / fx,
+            inverse_fy=1.0 / fy,
             near=self.near,
             far=self.far,
             **columns,
@@ -447,9 +452,9 @@ def check_size(size: Sequence[int]) -> Size:
         width, height = (int(v) for v in size)
         exact = all(int(v) == v for v in size)
     except (TypeError, ValueError):
-        raise SettingsError(f"image size {size}; expected two whole numbers, W and H") from None
+        raise SettingsError(f"size {size}; expected two whole numbers, W and H") from None
     if not exact or not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
-        raise SettingsError(f"image size {size[0]}x{size[1]}; expected 1 to {MAX_SIDE} each way")
+        raise SettingsError(f"size {size[0]}x{size[1]}; expected 1 to {MAX_SIDE} each way")
     return width, height
 
 

@@ -25,6 +25,7 @@ from .surface import (
     load,
     nearness_plane,
     plane_normal,
+    run_end,
     surface_point,
 )
 
@@ -166,22 +167,20 @@ def shade_normals(
         bad = 0
         while x < view.width:
             t = np.int64(triangle_id[y, x])
-            end = x + 1
-            while end < view.width and triangle_id[y, end] == t:
-                end += 1
+            end = run_end(triangle_id, y, x)
             if t < 0:
-                for j in range(x, end):
+                for j in range(np.uint64(x), np.uint64(end)):
                     for c in range(3):
                         geo_normal_vs[y, j, c] = 0.0
                 if want_shading:
-                    for j in range(x, end):
+                    for j in range(np.uint64(x), np.uint64(end)):
                         for c in range(3):
                             normal_vs[y, j, c] = 0.0
                 x = end
                 continue
             run = begin_run(view, geometry, positions_vs, t, x, y)
             g = run.geo_normal_vs
-            for j in range(x, end):
+            for j in range(np.uint64(x), np.uint64(end)):
                 geo_normal_vs[y, j, 0] = g.x
                 geo_normal_vs[y, j, 1] = g.y
                 geo_normal_vs[y, j, 2] = g.z
@@ -193,7 +192,7 @@ def shade_normals(
                         n = rotate_to_view(view, n_ws)
                     else:
                         bad += end - x
-                for j in range(x, end):
+                for j in range(np.uint64(x), np.uint64(end)):
                     if run.smooth and run.varies:
                         b = weights_at(view, run, j, y)
                         usable, n_ws = shading_normal_ws(geometry, run, t, b)
@@ -228,11 +227,9 @@ def shade_materials(
         x = 0
         while x < view.width:
             t = np.int64(triangle_id[y, x])
-            end = x + 1
-            while end < view.width and triangle_id[y, end] == t:
-                end += 1
+            end = run_end(triangle_id, y, x)
             if t < 0:
-                for j in range(x, end):
+                for j in range(np.uint64(x), np.uint64(end)):
                     object_id[y, j] = -1
                     material_id[y, j] = -1
                     roughness[y, j] = 0.0
@@ -254,16 +251,16 @@ def shade_materials(
             m = geometry.triangle_material[t]
             if varies:
                 run = begin_run(view, geometry, positions_vs, t, x, y)
-                for j in range(x, end):
+                for j in range(np.uint64(x), np.uint64(end)):
                     a = base_color(geometry, t, weights_at(view, run, j, y))
                     r = normal_reflectivity(geometry, t, a, fresnel, max_roughness)
                     store3(albedo, y, j, a)
                     store3(reflectivity, y, j, r)
             else:
-                for j in range(x, end):
+                for j in range(np.uint64(x), np.uint64(end)):
                     store3(albedo, y, j, a)
                     store3(reflectivity, y, j, r)
-            for j in range(x, end):
+            for j in range(np.uint64(x), np.uint64(end)):
                 object_id[y, j] = geometry.triangle_object[t]
                 material_id[y, j] = m
                 roughness[y, j] = geometry.roughness[m]

@@ -68,6 +68,15 @@ def make_edges(x0: int, y0: int, x1: int, y1: int, x2: int, y2: int) -> Edges:
 
 
 @kernel
+def covers(edges: Edges, x: int, y: int) -> bool:
+    """Whether the centre of pixel (x, y) is covered: no edge function is negative."""
+    e0 = edges.e0 + edges.a0 * x + edges.b0 * y
+    e1 = edges.e1 + edges.a1 * x + edges.b1 * y
+    e2 = edges.e2 + edges.a2 * x + edges.b2 * y
+    return (e0 | e1 | e2) >= 0
+
+
+@kernel
 def narrow(a: int, e: int, low: int, high: int) -> tuple[int, int]:
     """The part of the columns [low, high] where e + a·x ≥ 0; empty as low > high."""
     if a == 0:

@@ -39,47 +39,57 @@ def project(view: ViewParams, geometry: Geometry, gpu_vertices: bool = False) ->
 
 
 def rasterize(
-    view: ViewParams, geometry: Geometry, options: RasterOptions
+    view: ViewParams,
+    geometry: Geometry,
+    options: RasterOptions,
+    reuse: GBuffer | None = None,
 ) -> tuple[GBuffer, F64Array]:
-    """The G-buffer without radiance, and the view-space vertices (nv, 3) for later stages."""
-    height, width = view.height, view.width
-    projected = project(view, geometry, options.gpu_vertices)
+    """The G-buffer without radiance, and the view-space vertices (nv, 3) for later stages.
+
+    reuse: an earlier G-buffer whose arrays may be overwritten where shape and dtype agree; touching
+    fresh memory costs more than drawing into it.
+    """
+    size = (view.height, view.width)
+    old = {} if reuse is None else reuse.arrays()
+    images: dict[str, Any] = {}
+
+    def image(name: str, dtype: Any, channels: int = 0, wanted: bool = True) -> Any:
+        """A buffer by name; one that is not wanted has no pixels."""
+        shape = (size if wanted else (0, 0)) + ((channels,) if channels else ())
+        array = old.get(name)
+        if array is None or array.shape != shape or array.dtype != dtype:
+            array = np.empty(shape, dtype)
+        if wanted:
+            images[name] = array
+        return array
 
     # Visibility: depth, triangle id, back depth.
-    depth = np.empty((height, width), options.dtype)
-    triangle_id = np.empty((height, width), np.int32)
-    shape = (height, width) if options.back_depth else (0, 0)
-    back_depth = np.empty(shape, options.dtype)
+    projected = project(view, geometry, options.gpu_vertices)
+    triangle_id = image("triangle_id", np.int32)
     counts, clamped = draw_visibility(
-        view, geometry, projected, options, depth, triangle_id, back_depth
+        view,
+        geometry,
+        projected,
+        options,
+        image("depth", options.dtype),
+        triangle_id,
+        image("back_depth", options.dtype, wanted=options.back_depth),
     )
 
     # Attributes, only of visible surfaces.
-    images: dict[str, Any] = {}
-    repaired = np.zeros(height, np.int64)
+    repaired = np.zeros(view.height, np.int64)
     if options.geo_normal or options.normal:
-        geo_normal = np.empty((height, width, 3), options.dtype)
-        shape3 = (height, width, 3) if options.normal else (0, 0, 3)
-        normal = np.empty(shape3, options.dtype)
         attributes.shade_normals(
             view,
             geometry,
             projected.positions_vs,
             triangle_id,
             options.normal,
-            geo_normal,
-            normal,
+            image("geo_normal_vs", options.dtype, 3),
+            image("normal_vs", options.dtype, 3, wanted=options.normal),
             repaired,
         )
-        images["geo_normal_vs"] = geo_normal
-        if options.normal:
-            images["normal_vs"] = normal
     if options.material:
-        images["object_id"] = np.empty((height, width), np.int32)
-        images["material_id"] = np.empty((height, width), np.int32)
-        images["albedo"] = np.empty((height, width, 3), options.dtype)
-        images["reflectivity"] = np.empty((height, width, 3), options.dtype)
-        images["roughness"] = np.empty((height, width), options.dtype)
         attributes.shade_materials(
             view,
             geometry,
@@ -87,16 +97,13 @@ def rasterize(
             triangle_id,
             options.fresnel,
             options.max_roughness,
-            images["object_id"],
-            images["material_id"],
-            images["albedo"],
-            images["reflectivity"],
-            images["roughness"],
+            image("object_id", np.int32),
+            image("material_id", np.int32),
+            image("albedo", options.dtype, 3),
+            image("reflectivity", options.dtype, 3),
+            image("roughness", options.dtype),
         )
     gbuffer = GBuffer(
-        depth=depth,
-        triangle_id=triangle_id,
-        back_depth=back_depth if options.back_depth else None,
         counts=RasterCounts(
             triangles=len(geometry.faces),
             drawn=int(counts[visibility.DRAWN]),

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._jit import kernel
 from ..camera import ViewParams, point_at
-from ..typed import F64Array
+from ..typed import F64Array, I32Array
 from ..vecmath.vec import Vec3, cross, dot, sub
 
 
@@ -66,17 +66,18 @@ def nearness_plane(view: ViewParams, v0: Vec3, v1: Vec3, v2: Vec3) -> NearnessPl
     """
     n = plane_normal(v0, v1, v2)
     va = nearest_vertex(view, v0, v1, v2)
-    x0 = (0.5 - view.cx) / view.fx
-    y0 = (view.cy - 0.5) / view.fy
+    x0 = (0.5 - view.cx) * view.inverse_fx
+    y0 = (view.cy - 0.5) * view.inverse_fy
     if view.perspective:
-        scale = dot(n, va)
-        a = n.x / view.fx / scale
-        b = -n.y / view.fy / scale
-        c = (n.x * x0 + n.y * y0 - n.z) / scale
+        scale = 1.0 / dot(n, va)
+        a = n.x * view.inverse_fx * scale
+        b = -(n.y * view.inverse_fy * scale)
+        c = (n.x * x0 + n.y * y0 - n.z) * scale
     else:
-        a = -(n.x / view.fx / n.z)
-        b = n.y / view.fy / n.z
-        c = va.z - (n.x * (x0 - va.x) + n.y * (y0 - va.y)) / n.z
+        scale = 1.0 / n.z
+        a = -(n.x * view.inverse_fx * scale)
+        b = n.y * view.inverse_fy * scale
+        c = va.z - (n.x * (x0 - va.x) + n.y * (y0 - va.y)) * scale
     if np.isfinite(a) and np.isfinite(b) and np.isfinite(c):
         return NearnessPlane(a, b, c)
     depth = min(-v0.z, -v1.z, -v2.z)
@@ -149,3 +150,21 @@ def surface_point(view: ViewParams, plane: NearnessPlane, x: int, y: int) -> Vec
     """View-space point of the plane at the centre of pixel (x, y)."""
     depth = depth_of_nearness(view, nearness_at(plane, x, y))
     return point_at(view, x + 0.5, y + 0.5, depth)
+
+
+@kernel
+def run_end(ids: I32Array, row: int, x: int) -> int:
+    """One past the last column of the run of equal ids that starts at x."""
+    width = ids.shape[1]
+    first = ids[row, x]
+    end = x + 1
+    while end + 8 <= width:  # eight at a time while they are all equal
+        differs = np.int32(0)
+        for j in range(np.uint64(end), np.uint64(end + 8)):
+            differs |= ids[row, j] ^ first
+        if differs != 0:
+            break
+        end += 8
+    while end < width and ids[row, end] == first:
+        end += 1
+    return end

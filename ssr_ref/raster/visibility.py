@@ -22,6 +22,11 @@ from .geometry import DOUBLE_SIDED, Geometry
 BAND_ROWS = 16
 """Rows of a band: whole rows keep stores sequential, 16 of them stay in the L2 cache."""
 
+SPAN_COLUMNS = 8
+"""Records at most this wide test each pixel; wider ones compute the covered span of a row."""
+
+ANY_OBJECT = -2
+
 LEFT, RIGHT, TOP, BOTTOM, NEAR, GUARD, NON_FINITE = 1, 2, 4, 8, 16, 32, 64
 OUTSIDE = LEFT | RIGHT | TOP | BOTTOM | NEAR
 
@@ -278,28 +283,23 @@ def bin_records(records: I32Array, bands: int) -> tuple[I64Array, I32Array]:
 
 
 @kernel
-def piece_or_triangle(draw_id: int, nt: int, pieces: Pieces) -> int:
-    """The scene's triangle behind a draw id."""
-    return np.int64(pieces.parent[draw_id - nt]) if draw_id >= nt else np.int64(draw_id)
-
-
-@kernel
 def oriented_edges(
-    draw_id: int, nt: int, snapped: I32Array, faces: I32Array, pieces: Pieces
+    draw_id: int, nt: int, snapped: I32Array, faces: I32Array, piece_snapped: I32Array
 ) -> coverage.Edges:
     """Edge functions of a draw record, positive inside whichever way it winds."""
     if draw_id >= nt:
         piece = draw_id - nt
-        x0, y0 = np.int64(pieces.snapped[piece, 0]), np.int64(pieces.snapped[piece, 1])
-        x1, y1 = np.int64(pieces.snapped[piece, 2]), np.int64(pieces.snapped[piece, 3])
-        x2, y2 = np.int64(pieces.snapped[piece, 4]), np.int64(pieces.snapped[piece, 5])
+        x0, y0 = np.int64(piece_snapped[piece, 0]), np.int64(piece_snapped[piece, 1])
+        x1, y1 = np.int64(piece_snapped[piece, 2]), np.int64(piece_snapped[piece, 3])
+        x2, y2 = np.int64(piece_snapped[piece, 4]), np.int64(piece_snapped[piece, 5])
     else:
         i0, i1, i2 = faces[draw_id, 0], faces[draw_id, 1], faces[draw_id, 2]
         x0, y0 = np.int64(snapped[i0, 0]), np.int64(snapped[i0, 1])
         x1, y1 = np.int64(snapped[i1, 0]), np.int64(snapped[i1, 1])
         x2, y2 = np.int64(snapped[i2, 0]), np.int64(snapped[i2, 1])
     if coverage.doubled_area(x0, y0, x1, y1, x2, y2) < 0:
-        return coverage.make_edges(x0, y0, x2, y2, x1, y1)
+        x1, x2 = x2, x1
+        y1, y2 = y2, y1
     return coverage.make_edges(x0, y0, x1, y1, x2, y2)
 
 
@@ -331,24 +331,53 @@ def draw_front(
     """Draw a band's front records; larger k wins, at equal k the lower id, drawn first."""
     nt = faces.shape[0]
     last = row0 + nearness.shape[0] - 1
+    positions_vs, snapped = projected.positions_vs, projected.snapped
+    parent, piece_snapped = pieces.parent, pieces.snapped
+    records, order = bins.records, bins.order
     for slot in range(bins.start[band], bins.start[band + 1]):
-        r = bins.order[slot]
-        draw_id = np.int64(bins.records[r, 0])
-        columns, rows = np.int64(bins.records[r, 1]), np.int64(bins.records[r, 2])
-        edges = oriented_edges(draw_id, nt, projected.snapped, faces, pieces)
-        t = piece_or_triangle(draw_id, nt, pieces)
-        plane = triangle_plane(view, projected.positions_vs, faces, t)
-        for y in range(max(row0, rows & 0xFFFF), min(last, rows >> 16) + 1):
-            low, high = coverage.row_span(edges, y, columns & 0xFFFF, columns >> 16)
-            start = plane.c + plane.b * y
-            k_row = nearness[y - row0]
-            id_row = ids[y - row0]
-            for x in range(low, high + 1):
-                k = start + plane.a * x
-                before = k_row[x]
-                wins = k > before
-                k_row[x] = k if wins else before
-                id_row[x] = draw_id if wins else id_row[x]
+        r = order[slot]
+        draw_id = np.int64(records[r, 0])
+        columns, rows = np.int64(records[r, 1]), np.int64(records[r, 2])
+        x_first, x_last = columns & 0xFFFF, columns >> 16
+        t = np.int64(parent[draw_id - nt]) if draw_id >= nt else draw_id
+        edges = oriented_edges(draw_id, nt, snapped, faces, piece_snapped)
+        y_first, y_last = max(row0, rows & 0xFFFF), min(last, rows >> 16)
+        if x_last - x_first < SPAN_COLUMNS:
+            # Step the edge functions; a record that covers no centre needs no plane.
+            c0 = edges.e0 + edges.a0 * x_first + edges.b0 * y_first
+            c1 = edges.e1 + edges.a1 * x_first + edges.b1 * y_first
+            c2 = edges.e2 + edges.a2 * x_first + edges.b2 * y_first
+            plane = surface.NearnessPlane(0.0, 0.0, 0.0)
+            planned = False
+            for y in range(y_first, y_last + 1):
+                f0, f1, f2 = c0, c1, c2
+                for x in range(x_first, x_last + 1):
+                    if (f0 | f1 | f2) >= 0:
+                        if not planned:
+                            plane = triangle_plane(view, positions_vs, faces, t)
+                            planned = True
+                        k = surface.nearness_at(plane, x, y)
+                        if k > nearness[y - row0, x]:
+                            nearness[y - row0, x] = k
+                            ids[y - row0, x] = draw_id
+                    f0 += edges.a0
+                    f1 += edges.a1
+                    f2 += edges.a2
+                c0 += edges.b0
+                c1 += edges.b1
+                c2 += edges.b2
+        else:
+            plane = triangle_plane(view, positions_vs, faces, t)
+            for y in range(y_first, y_last + 1):
+                row = y - row0
+                start = plane.c + plane.b * y
+                low, high = coverage.row_span(edges, y, x_first, x_last)
+                for x in range(np.uint64(low), np.uint64(max(low, high + 1))):
+                    k = start + plane.a * x
+                    before = nearness[row, x]
+                    wins = k > before
+                    nearness[row, x] = k if wins else before
+                    ids[row, x] = draw_id if wins else ids[row, x]
 
 
 @kernel
@@ -369,25 +398,51 @@ def draw_back(
     """Draw a band's back faces: nearest strictly behind the front, of the front's object."""
     nt = faces.shape[0]
     last = row0 + nearness.shape[0] - 1
+    positions_vs, snapped = projected.positions_vs, projected.snapped
+    parent, piece_snapped = pieces.parent, pieces.snapped
+    records, order = bins.records, bins.order
     for slot in range(bins.start[band], bins.start[band + 1]):
-        r = bins.order[slot]
-        draw_id = np.int64(bins.records[r, 0])
-        columns, rows = np.int64(bins.records[r, 1]), np.int64(bins.records[r, 2])
-        edges = oriented_edges(draw_id, nt, projected.snapped, faces, pieces)
-        t = piece_or_triangle(draw_id, nt, pieces)
-        plane = triangle_plane(view, projected.positions_vs, faces, t)
-        mine = -2 if any_object else triangle_object[t]
-        for y in range(max(row0, rows & 0xFFFF), min(last, rows >> 16) + 1):
-            low, high = coverage.row_span(edges, y, columns & 0xFFFF, columns >> 16)
-            start = plane.c + plane.b * y
-            k_row = nearness[y - row0]
-            front_row = front[y - row0]
-            owner_row = owner[y - row0]
-            for x in range(low, high + 1):
-                k = start + plane.a * x
-                before = k_row[x]
-                wins = (k > before) & (k < front_row[x]) & (owner_row[x] == mine)
-                k_row[x] = k if wins else before
+        r = order[slot]
+        draw_id = np.int64(records[r, 0])
+        columns, rows = np.int64(records[r, 1]), np.int64(records[r, 2])
+        x_first, x_last = columns & 0xFFFF, columns >> 16
+        t = np.int64(parent[draw_id - nt]) if draw_id >= nt else draw_id
+        edges = oriented_edges(draw_id, nt, snapped, faces, piece_snapped)
+        mine = ANY_OBJECT if any_object else triangle_object[t]
+        y_first, y_last = max(row0, rows & 0xFFFF), min(last, rows >> 16)
+        if x_last - x_first < SPAN_COLUMNS:
+            c0 = edges.e0 + edges.a0 * x_first + edges.b0 * y_first
+            c1 = edges.e1 + edges.a1 * x_first + edges.b1 * y_first
+            c2 = edges.e2 + edges.a2 * x_first + edges.b2 * y_first
+            plane = surface.NearnessPlane(0.0, 0.0, 0.0)
+            planned = False
+            for y in range(y_first, y_last + 1):
+                f0, f1, f2 = c0, c1, c2
+                for x in range(x_first, x_last + 1):
+                    if (f0 | f1 | f2) >= 0 and owner[y - row0, x] == mine:
+                        if not planned:
+                            plane = triangle_plane(view, positions_vs, faces, t)
+                            planned = True
+                        k = surface.nearness_at(plane, x, y)
+                        if k > nearness[y - row0, x] and k < front[y - row0, x]:
+                            nearness[y - row0, x] = k
+                    f0 += edges.a0
+                    f1 += edges.a1
+                    f2 += edges.a2
+                c0 += edges.b0
+                c1 += edges.b1
+                c2 += edges.b2
+        else:
+            plane = triangle_plane(view, positions_vs, faces, t)
+            for y in range(y_first, y_last + 1):
+                row = y - row0
+                start = plane.c + plane.b * y
+                low, high = coverage.row_span(edges, y, x_first, x_last)
+                for x in range(np.uint64(low), np.uint64(max(low, high + 1))):
+                    k = start + plane.a * x
+                    before = nearness[row, x]
+                    wins = (k > before) & (k < front[row, x]) & (owner[row, x] == mine)
+                    nearness[row, x] = k if wins else before
 
 
 @kernel
@@ -425,39 +480,43 @@ def settle_front(
     triangle_id: I32Array,
 ) -> int:
     """Clamp visible depths to their polygons and store depth and triangle id; pixels clamped."""
-    nt = geometry.faces.shape[0]
+    faces = geometry.faces
+    parent = pieces.parent
+    nt = faces.shape[0]
+    width = nearness.shape[1]
     clamped = 0
     for row in range(nearness.shape[0]):
         y = row0 + row
         x = 0
-        while x < nearness.shape[1]:
+        while x < width:
             draw_id = np.int64(ids[row, x])
-            end = x + 1
-            while end < nearness.shape[1] and ids[row, end] == draw_id:
-                end += 1
-            if draw_id < 0:
-                for j in range(x, end):
-                    depth[y, j] = np.inf
-                    triangle_id[y, j] = -1
-                if want_back:
+            end = surface.run_end(ids, row, x)
+            t = np.int64(parent[draw_id - nt]) if draw_id >= nt else draw_id
+            mine = np.int32(-1)
+            if draw_id >= 0:
+                # Count first, in a loop without branches; few runs have anything to clamp.
+                low, high = polygon_range(view, projected, faces, pieces, draw_id)
+                outside = 0
+                for j in range(np.uint64(x), np.uint64(end)):
+                    outside += (nearness[row, j] < low) | (nearness[row, j] > high)
+                if outside > 0:
+                    clamped += outside
                     for j in range(x, end):
-                        owner[row, j] = -1
-            else:
-                low, high = polygon_range(view, projected, geometry.faces, pieces, draw_id)
-                t = piece_or_triangle(draw_id, nt, pieces)
-                for j in range(x, end):
-                    k = nearness[row, j]
-                    if k < low or k > high:
-                        k = min(max(k, low), high)
-                        nearness[row, j] = k
-                        clamped += 1
-                    depth[y, j] = surface.depth_of_nearness(view, k)
-                    triangle_id[y, j] = t
+                        nearness[row, j] = min(max(nearness[row, j], low), high)
                 if want_back:
-                    mine = -2 if any_object else geometry.triangle_object[t]
-                    for j in range(x, end):
-                        owner[row, j] = mine
+                    mine = np.int32(ANY_OBJECT) if any_object else geometry.triangle_object[t]
+            if t != draw_id:
+                for j in range(x, end):
+                    ids[row, j] = t
+            if want_back:
+                for j in range(np.uint64(x), np.uint64(end)):
+                    owner[row, j] = mine
             x = end
+        for j in range(width):
+            triangle_id[y, j] = ids[row, j]
+        for j in range(width):
+            k = nearness[row, j]
+            depth[y, j] = surface.depth_of_nearness(view, k) if ids[row, j] >= 0 else np.inf
     return clamped
 
 

@@ -24,7 +24,7 @@ from ..raster.attributes import (
     weights_at,
 )
 from ..raster.geometry import Geometry
-from ..raster.surface import Barycentric, load, plane_normal
+from ..raster.surface import Barycentric, load, plane_normal, run_end
 from ..scene import Lights
 from ..typed import F64Array, FloatArray, I32Array
 from ..vecmath.vec import Vec3, dot, normalize
@@ -91,11 +91,9 @@ def shade_radiance(
         x = 0
         while x < view.width:
             t = np.int64(triangle_id[y, x])
-            end = x + 1
-            while end < view.width and triangle_id[y, end] == t:
-                end += 1
+            end = run_end(triangle_id, y, x)
             if t < 0:
-                for j in range(x, end):
+                for j in range(np.uint64(x), np.uint64(end)):
                     store3(radiance, y, j, Vec3(0.0, 0.0, 0.0))
                 x = end
                 continue
@@ -110,7 +108,7 @@ def shade_radiance(
             color = diffuse(
                 base_color(geometry, t, corner), n if usable else flat, emissive, lights
             )
-            for j in range(x, end):
+            for j in range(np.uint64(x), np.uint64(end)):
                 if run.varies:
                     b = weights_at(view, run, j, y)
                     usable, n = False, flat

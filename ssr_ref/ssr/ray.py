@@ -182,6 +182,16 @@ def set_up_ray(
         k0, k1, scale = depth, depth1, t
         x1 = view.width * 0.5 + (cx + t * dx) * (view.width * 0.5)
         y1 = view.height * 0.5 - (cy + t * dy) * (view.height * 0.5)
+    # A side of the image is met exactly: many samples and ends fall on pixel borders if S is whole
+    # or half, and an ulp must not choose between two pixels.
+    if end == LEFT_SCREEN_L:
+        x1 = 0.0
+    elif end == LEFT_SCREEN_R:
+        x1 = np.float64(view.width)
+    elif end == LEFT_SCREEN_T:
+        y1 = 0.0
+    elif end == LEFT_SCREEN_B:
+        y1 = np.float64(view.height)
     delta_x, delta_y = x1 - px, y1 - py
     s_end = max(abs(delta_x), abs(delta_y))
     if not (s_end > 0.0 and np.isfinite(s_end)):

@@ -21,7 +21,7 @@ class Cell(NamedTuple):
 
 
 def cells_crossed(
-    p0: tuple[float, float], dp: tuple[float, float], end: float | Fraction
+    p0: tuple[float, float], dp: tuple[float | Fraction, float | Fraction], end: float | Fraction
 ) -> list[Cell]:
     """Cells of P(s) = p0 + s·dp, 0 ≤ s ≤ end, in order: |Δix| + |Δiy| + 1 of them.
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from oracles.cells import Cell, cells_crossed
-from oracles.noise import jitter_of
 
 from ssr_ref.buffers import End, Flag, Status
 
@@ -64,7 +63,7 @@ class Inputs:
 
 
 class Outcome(NamedTuple):
-    """What spec 5 and 4.6 to 4.7 say of a pixel; `slack` is how near a count was to another."""
+    """What spec 4.6, 4.7 and 5 say of a pixel."""
 
     status: Status
     end: int = 0
@@ -76,6 +75,24 @@ class Outcome(NamedTuple):
     depth: float = math.nan
     residual: float = math.nan
     s: float = math.nan
+
+
+def pcg3d(v: tuple[int, int, int]) -> tuple[int, int, int]:
+    """Jarzynski and Olano 2020, listing 16, on Python's integers modulo 2³²."""
+    x, y, z = ((c * 1664525 + 1013904223) % 2**32 for c in v)
+    x = (x + y * z) % 2**32
+    y = (y + z * x) % 2**32
+    z = (z + x * y) % 2**32
+    x, y, z = (c ^ (c // 2**16) for c in (x, y, z))
+    x = (x + y * z) % 2**32
+    y = (y + z * x) % 2**32
+    z = (z + x * y) % 2**32
+    return x, y, z
+
+
+def jitter_of(x: int, y: int, seed: int) -> float:
+    """4.8: the first word's top 24 bits as a fraction, plus 2⁻²⁴."""
+    return (pcg3d((x, y, seed))[0] // 2**8) / 2**24 + 1 / 2**24
 
 
 def dot(a: Any, b: Any) -> float:
@@ -402,3 +419,35 @@ def cells_between(walk: Walk, a: float, b: float) -> list[tuple[Cell, float, flo
         for cell in walk.cells()
         if cell.leave > a and cell.enter < b
     ]
+
+
+def inputs_of(view: Any, gbuffer: Any, settings: Any) -> Inputs:
+    """The oracle's inputs from the package's view, buffers and settings."""
+    return Inputs(
+        perspective=view.perspective,
+        width=view.width,
+        height=view.height,
+        p00=view.p00,
+        p11=view.p11,
+        p0k=view.offset_x,
+        p1k=view.offset_y,
+        near=view.near,
+        depth=gbuffer.depth.tolist(),
+        geo_normal=gbuffer.geo_normal_vs.tolist(),
+        normal=gbuffer.normal_vs.tolist(),
+        reflectivity=gbuffer.reflectivity.tolist(),
+        back=gbuffer.back_depth.tolist() if settings.thickness_from == "back_faces" else None,
+        unit=2.0**-53 if gbuffer.depth.dtype == "float64" else 2.0**-24,
+        tracer=settings.tracer,
+        stride=settings.stride,
+        jitter=settings.jitter,
+        seed=settings.seed,
+        max_steps=INF if settings.max_steps is None else settings.max_steps,
+        max_distance=settings.max_distance,
+        bias=settings.bias,
+        thickness=settings.thickness,
+        interval=settings.interval,
+        rewalk=settings.tracer == "dda"
+        and (settings.refine == "rewalk" or (settings.refine == "auto" and settings.stride > 1)),
+        reject_self=settings.self_rejection == "plane",
+    )
