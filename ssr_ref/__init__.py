@@ -41,7 +41,33 @@ _WHERE = {
     "SsrRefWarning": "errors",
 }
 
-__all__ = sorted([*_WHERE, "__version__"])
+__all__ = [
+    "Camera",
+    "DirectionalLight",
+    "End",
+    "Flag",
+    "Frame",
+    "GBuffer",
+    "HitBuffer",
+    "Lights",
+    "Material",
+    "Mesh",
+    "Node",
+    "Primitive",
+    "Resolved",
+    "Scene",
+    "Settings",
+    "SsrRefError",
+    "SsrRefWarning",
+    "Status",
+    "View",
+    "__version__",
+    "load",
+    "load_bundle",
+    "look_at",
+    "render",
+    "write_bundle",
+]
 
 if TYPE_CHECKING:
     from .buffers import End as End

@@ -146,6 +146,23 @@ class _PackageCache(FunctionCache):  # type: ignore[misc]
             self.disable()
 
 
+_DRIVERS: list[Any] = []
+
+
+def compile_seconds() -> dict[str, float]:
+    """Time that each driver's code took to compile or to load in this process, longest first."""
+    found = {}
+    for dispatcher in _DRIVERS:
+        metadata = getattr(dispatcher, "get_metadata", dict)() or {}
+        total = sum(
+            timer.get("compiler_lock", 0.0) or timer.get("llvm_lock", 0.0)
+            for timer in (m.get("timers", {}) for m in metadata.values())
+        )
+        if metadata:
+            found[dispatcher.py_func.__name__] = total
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
 def kernel(function: F) -> F:
     """Compile a scalar, pure, allocation-free function; it is inlined into its drivers."""
     return numba.njit(error_model="numpy")(function)  # type: ignore[no-any-return]
@@ -159,6 +176,8 @@ def driver(*, parallel: bool = True) -> Callable[[F], F]:
         if JIT_ENABLED:
             cached = cache_folder() is not None
             compiled._cache = _PackageCache(function) if cached else NullCache()
+
+        _DRIVERS.append(compiled)
 
         @functools.wraps(function)
         def call(*args: Any) -> Any:

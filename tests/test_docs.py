@@ -1,0 +1,610 @@
+"""The documentation agrees with the code: numbers, listings, worked examples, links.
+
+`python tests/test_docs.py` writes the worked examples anew into the pages that hold them.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ssr_ref
+from ssr_ref import Camera, Mesh, Node, Scene, Settings, View, camera, settings, transforms
+from ssr_ref._jit import _fma_exact
+from ssr_ref.buffers import STATUS_OF_END, End, Flag, Status
+from ssr_ref.fileio.manifest import SCHEMA_VERSION
+from ssr_ref.pipeline import Frame
+from ssr_ref.raster import attributes, clip, coverage, geometry
+from ssr_ref.scenes import build
+from ssr_ref.ssr import fade, march_cells
+from ssr_ref.vecmath.elementary import pow as power
+from ssr_ref.vecmath.noise import jitter, pcg3d
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+Space = dict[str, Any]
+
+
+def page(name: str) -> str:
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def rows(text: str, heading: str) -> list[list[str]]:
+    """The cells of the first table after a heading, without its own two head lines."""
+    after = text.split(heading, 1)[1].lstrip("\n").split("\n")
+    start = next(i for i, line in enumerate(after) if line.startswith("|"))
+    found = []
+    for line in after[start + 2 :]:
+        if not line.startswith("|"):
+            break
+        found.append([cell.strip() for cell in line.strip("|").split("|")])
+    return found
+
+
+def listings(name: str, first: str) -> Space:
+    """Run a page's Python listings, from the one that holds `first` on, in one namespace."""
+    blocks = re.findall(r"```python\n(.*?)```", page(name), re.DOTALL)
+    start = next(i for i, block in enumerate(blocks) if first in block)
+    space: Space = {"fma": _fma_exact, "f32": lambda x: float(np.float32(x)), "power": power}
+    space |= {n: getattr(math, n) for n in ("inf", "isfinite", "isinf", "nextafter", "sqrt")}
+    space |= {"floor": math.floor, "HIT": int(Status.HIT)}
+    space |= {n: int(Status[n]) for n in ("BACKGROUND", "NOT_REFLECTIVE")}
+    exec(compile("\n".join(blocks[start:]), name, "exec"), space)
+    return space
+
+
+# ---- Numbers -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("heading", "numbers"), [("## Status", Status), ("## End", End), ("## Flags", Flag)]
+)
+def test_tables_of_numbers_are_the_enums(heading: str, numbers: Any) -> None:
+    table = [(int(row[0]), row[1]) for row in rows(page("statuses.md"), heading)]
+    assert table == [(int(member), str(member.name)) for member in numbers]
+
+
+def test_status_of_an_end() -> None:
+    assert f"status = end + {int(STATUS_OF_END)}" in page("statuses.md")
+    for end in End:
+        if end != End.NONE:
+            assert Status(end + STATUS_OF_END).name == end.name
+
+
+def test_constants_are_those_of_the_code() -> None:
+    table = {row[0].strip("`"): row[1] for row in rows(page("specification.md"), "Constants:")}
+    for name, text in table.items():
+        modules = (camera, clip, coverage, march_cells, attributes, fade, settings)
+        found = {getattr(module, name) for module in modules if hasattr(module, name)}
+        base, _, exponent = text.partition("^")
+        assert found == {float(base) ** int(exponent or 1)}, name
+
+
+def test_schema_version() -> None:
+    assert f"`schema_version` {SCHEMA_VERSION}." in page("specification.md")
+
+
+def test_jitter_values() -> None:
+    """Sixteen values: the page's listing, Python's integers and the kernel agree."""
+    listed = rows(page("dda.md"), "## Jitter")
+    assert len(listed) == 16
+    text = listings("dda.md", "def trace_pixel")
+    for x, y, seed, word, j in listed:
+        at = (int(x), int(y), int(seed))
+        assert int(word.strip("`"), 16) == text["pcg3d"](*at)[0] == pcg3d(*at)[0]
+        assert float(j) == text["jitter"](*at) == jitter(*at)
+
+
+# ---- The tracer's listing ----------------------------------------------------------------------
+
+
+def trace_by_listing(space: Space, frame: Frame) -> list[list[Any]]:
+    """Every pixel of a frame's G-buffer traced by dda.md's listing."""
+    chosen, g = frame.settings, frame.gbuffer
+    assert g.normal_vs is not None
+    assert g.geo_normal_vs is not None
+    assert g.reflectivity is not None
+    view = frame.camera.params(chosen.size)
+    from_back_faces = chosen.thickness_from == "back_faces" and g.back_depth is not None
+    buffers = SimpleNamespace(
+        depth=g.depth.tolist(),
+        normal=g.normal_vs.tolist(),
+        geo_normal=g.geo_normal_vs.tolist(),
+        reflectivity=g.reflectivity.tolist(),
+        back=g.back_depth.tolist() if from_back_faces and g.back_depth is not None else None,
+    )
+    front = space["prepare_targets"](view, buffers.depth, buffers.geo_normal)
+    values = listing_settings(frame)
+    return [
+        [space["trace_pixel"](view, buffers, front, values, x, y) for x in range(view.width)]
+        for y in range(view.height)
+    ]
+
+
+def listing_settings(frame: Frame) -> SimpleNamespace:
+    chosen = frame.settings
+    return SimpleNamespace(
+        tracer=chosen.tracer,
+        stride=chosen.stride,
+        jitter=chosen.jitter,
+        seed=chosen.seed,
+        refine=chosen.refines,
+        cell_interval=chosen.interval == "cell",
+        max_steps=math.inf if chosen.max_steps is None else chosen.max_steps,
+        max_distance=chosen.max_distance,
+        thickness=chosen.thickness,
+        bias=chosen.bias,
+        rounding=2.0**-53 if frame.gbuffer.depth.dtype == np.float64 else 2.0**-24,
+        reject_self=chosen.self_rejection == "plane",
+    )
+
+
+ORTHOGRAPHIC = View((0.8, 1.2, 3.75), (0.08, 0.2, 0.0), orthographic_height=2.6, far=5.0)
+INSIDE = View((0.3, 0.4, 0.5), (0.08, 0.2, 0.0), fov_y_degrees=100.0, near=0.3)
+SHIFTED = View((0.8, 1.2, 3.75), (0.08, 0.2, 0.0), fov_y_degrees=36.0, jitter=(0.3, -0.2))
+
+TRACES: list[tuple[View | None, dict[str, Any]]] = [
+    (None, {}),
+    (None, {"tracer": "cells"}),
+    (SHIFTED, {"stride": 4, "jitter": True, "seed": 7}),
+    (None, {"stride": 3, "refine": "none", "interval": "cell", "thickness_from": "constant"}),
+    (None, {"max_distance": math.inf, "max_steps": 5, "self_rejection": "none", "bias": 0.01}),
+    (INSIDE, {"max_distance": 0.4, "refine": "rewalk"}),
+    (ORTHOGRAPHIC, {"stride": 2}),
+    (ORTHOGRAPHIC, {"tracer": "cells", "max_distance": math.inf}),
+]
+
+
+@pytest.mark.parametrize(("view", "options"), TRACES)
+def test_the_listing_of_the_tracer_gives_the_same_bytes(
+    view: View | None, options: dict[str, Any]
+) -> None:
+    frame = ssr_ref.render(build("teapot", 3), view, Settings(size=(37, 23), **options))
+    assert (frame.hits.status == Status.HIT).sum() > 10
+    traced = trace_by_listing(listings("dda.md", "def trace_pixel"), frame)
+    for name, expected in frame.hits.arrays().items():
+        got = np.array([[getattr(out, name) for out in row] for row in traced], expected.dtype)
+        assert got.tobytes() == expected.tobytes(), name
+
+
+# ---- The specification's listings --------------------------------------------------------------
+
+
+class PlainGeometry:
+    """A flattened scene as the specification's listings read it."""
+
+    def __init__(self, space: Space, scene: Scene, view: Any) -> None:
+        flat = geometry.flatten(scene)
+        self.positions_ws = [tuple(p) for p in flat.positions_ws.tolist()]
+        self.positions_vs = [space["to_view"](view, p) for p in self.positions_ws]
+        self.faces = flat.faces.tolist()
+        self.object = flat.triangle_object.tolist()
+        self.material = [scene.materials[m] for m in flat.triangle_material]
+        self.double_sided = [bool(f & geometry.DOUBLE_SIDED) for f in flat.triangle_flags]
+        self._flags = flat.triangle_flags
+        self._normals = [tuple(n) for n in flat.normals_ws.tolist()]
+        self._colors = [tuple(c) for c in flat.colors.tolist()]
+
+    def corners_vs(self, t: int) -> list[Any]:
+        return [self.positions_vs[i] for i in self.faces[t]]
+
+    def corners_ws(self, t: int) -> list[Any]:
+        return [self.positions_ws[i] for i in self.faces[t]]
+
+    def vertex_normals(self, t: int) -> list[Any] | None:
+        has = self._flags[t] & geometry.HAS_NORMALS
+        return [self._normals[i] for i in self.faces[t]] if has else None
+
+    def vertex_colors(self, t: int) -> list[Any] | None:
+        has = self._flags[t] & geometry.HAS_COLORS
+        return [self._colors[i] for i in self.faces[t]] if has else None
+
+    def varies(self, t: int) -> bool:
+        attributes_of_t = (self.vertex_normals(t), self.vertex_colors(t))
+        return any(r is not None and not (r[0] == r[1] == r[2]) for r in attributes_of_t)
+
+
+def draw_by_listing(space: Space, frame: Frame) -> dict[str, Any]:
+    """The G-buffer of a frame, unrounded, by specification.md's listings."""
+    chosen, scene = frame.settings, frame.scene
+    view = frame.camera.params(chosen.size)
+    shapes = PlainGeometry(space, scene, view)
+    gpu = chosen.snap == "gpu_vertices"
+    depth, triangle, back = space["draw"](view, shapes, gpu, chosen.back_any_object)
+    lights = [
+        (tuple(-c for c in transforms.normalized3(light.direction_ws)), light.color)
+        for light in scene.lights.directional
+    ]
+    names = ("geo_normal_vs", "normal_vs", "albedo", "reflectivity", "radiance")
+    images: dict[str, Any] = {
+        name: [[(0.0, 0.0, 0.0)] * view.width for _ in range(view.height)] for name in names
+    }
+    for y, x, t in visible(triangle):
+        first = x
+        while first > 0 and triangle[y][first - 1] == t:
+            first -= 1
+        geo, behind = space["geometric_normal"](view, shapes, t, first, y)
+        b = space["weights"](view, shapes, t, x, y) if shapes.varies(t) else (1.0, 0.0, 0.0)
+        n_ws = space["shading_normal_ws"](shapes, t, b, behind)
+        albedo = space["base_color"](shapes, t, b)
+        material = shapes.material[t]
+        lit = space["flat_normal_ws"](shapes, t, behind) if n_ws is None else n_ws
+        values = (
+            geo,
+            geo if n_ws is None else space["rotate_to_view"](view, n_ws),
+            albedo,
+            space["normal_reflectivity"](material, albedo, chosen.fresnel, chosen.max_roughness),
+            space["diffuse"](albedo, lit, material.emissive, scene.lights.ambient, lights),
+        )
+        for name, value in zip(names, values):
+            images[name][y][x] = value
+    return {"depth": depth, "triangle_id": triangle, "back_depth": back, **images}
+
+
+def visible(triangle: list[list[int]]) -> Iterator[tuple[int, int, int]]:
+    for y, row in enumerate(triangle):
+        for x, t in enumerate(row):
+            if t >= 0:
+                yield y, x, t
+
+
+def resolve_by_listing(space: Space, frame: Frame) -> dict[str, Any]:
+    """What `resolve` gives, unrounded, by specification.md's listings."""
+    g, hits = frame.gbuffer, frame.hits
+    assert g.radiance is not None
+    assert g.reflectivity is not None
+    assert g.normal_vs is not None
+    view = frame.camera.params(frame.settings.size)
+    buffers = SimpleNamespace(
+        radiance=g.radiance.tolist(),
+        reflectivity=g.reflectivity.tolist(),
+        normal=g.normal_vs.tolist(),
+    )
+    status, hit_px, length = hits.status.tolist(), hits.hit_px.tolist(), hits.length.tolist()
+    values = [
+        [
+            space["resolve_pixel"](
+                view, x, y, status[y][x], hit_px[y][x], length[y][x], buffers, frame.settings
+            )
+            for x in range(view.width)
+        ]
+        for y in range(view.height)
+    ]
+    names = ("edge_fade", "distance_fade", "confidence", "reflection", "composite")
+    return {name: [[v[i] for v in row] for row in values] for i, name in enumerate(names)}
+
+
+def varied_scene() -> Scene:
+    """The teapot scene with vertex colours, double-sided materials and a mirroring node."""
+    scene = build("teapot", 2)
+    rng = np.random.default_rng(1)
+    colored = {"ball", "block", "left wall"}
+    meshes = tuple(
+        Mesh(
+            mesh.name,
+            tuple(
+                replace(p, colors=rng.random(p.positions.shape).astype(np.float32))
+                if mesh.name in colored
+                else p
+                for p in mesh.primitives
+            ),
+        )
+        for mesh in scene.meshes
+    )
+    materials = tuple(
+        replace(m, double_sided=m.name in ("ceramic", "red wall")) for m in scene.materials
+    )
+    nodes = list(scene.nodes)
+    place = np.array(nodes[2].world_from_mesh)
+    place[:3, 0] *= -1.5
+    nodes[2] = Node("ball", 2, place)
+    return replace(scene, meshes=meshes, materials=materials, nodes=tuple(nodes))
+
+
+RENDERS: list[tuple[Callable[[], Scene], View | None, dict[str, Any]]] = [
+    (lambda: build("teapot", 2), None, {}),
+    (
+        varied_scene,
+        None,
+        {
+            "snap": "gpu_vertices",
+            "fresnel": True,
+            "fallback": "constant",
+            "fallback_color": (0.1, 0.2, 0.3),
+            "distance_fade": "linear",
+        },
+    ),
+    (varied_scene, ORTHOGRAPHIC, {"back_any_object": True, "edge_fade": False}),
+    (varied_scene, INSIDE, {"distance_fade": "published", "edge_power": 1.5, "fresnel": True}),
+    (lambda: build("poles", 2), View((1.5, 1.0, 2.0), (0.0, 0.3, 0.0), far=3.5), {}),
+]
+
+
+@pytest.mark.parametrize(("scene", "view", "options"), RENDERS)
+def test_the_listings_of_the_specification_give_the_same_bytes(
+    scene: Callable[[], Scene], view: View | None, options: dict[str, Any]
+) -> None:
+    frame = ssr_ref.render(scene(), view, Settings(size=(33, 19), **options))
+    space = listings("specification.md", "def to_view")
+    images = draw_by_listing(space, frame) | resolve_by_listing(space, frame)
+    stored = frame.gbuffer.arrays() | frame.resolved.arrays()
+    for name, image in images.items():
+        assert np.array(image, stored[name].dtype).tobytes() == stored[name].tobytes(), name
+
+
+def test_the_listings_of_transforms() -> None:
+    """World positions and normals of every vertex, one node mirrored and sheared by its scale."""
+    scene = varied_scene()
+    flat = geometry.flatten(scene)
+    space = listings("specification.md", "def to_view")
+    v = 0
+    for node in scene.nodes:
+        m = node.world_from_mesh.tolist()
+        for primitive in scene.meshes[node.mesh].primitives:
+            for i, p in enumerate(primitive.positions.tolist()):
+                assert space["transform"](m, p) == tuple(flat.positions_ws[v + i])
+                if primitive.normals is not None:
+                    n = primitive.normals[i].tolist()
+                    assert space["vertex_normal_ws"](m, n) == tuple(flat.normals_ws[v + i])
+            v += len(primitive.positions)
+
+
+# ---- Worked examples ---------------------------------------------------------------------------
+
+
+def number(value: float) -> str:
+    return f"{value:.10g}"
+
+
+def vector(values: Any) -> str:
+    return "(" + ", ".join(number(float(v)) for v in values) + ")"
+
+
+def matrix(m: Any) -> list[str]:
+    return ["    [" + ", ".join(f"{number(float(v)):>13}" for v in row) + "]" for row in m]
+
+
+def conventions_example() -> str:
+    """One world point through the camera, by the package and by matrices."""
+    size = (64, 36)
+    pose = camera.look_at((0.0, 3.0, 4.0), (0.0, 0.0, 0.0))
+    cam = Camera.physical(pose, 24.0, 24.0, 64 / 36, near=0.125)
+    view = cam.params(size)
+    space = listings("specification.md", "def to_view")
+    p_ws = (0.5, 0.25, -0.75)
+    p_vs = space["to_view"](view, p_ws)
+    x, y, w = space["clip_xyw"](view, p_vs)
+    px = view.width * 0.5 + x / w * (view.width * 0.5)
+    py = view.height * 0.5 - y / w * (view.height * 0.5)
+
+    view_from_world = transforms.rigid_inverse(pose)
+    clip_from_world = transforms.multiply(cam.clip_from_view, view_from_world)
+    homogeneous = [
+        row[0] * p_ws[0] + row[1] * p_ws[1] + row[2] * p_ws[2] + row[3]
+        for row in clip_from_world.tolist()
+    ]
+    ndc = [v / homogeneous[3] for v in homogeneous[:3]]
+    by_matrix = ((0.5 + ndc[0] * 0.5) * size[0], (0.5 - ndc[1] * 0.5) * size[1])
+    assert np.allclose(by_matrix, (px, py), rtol=0.0, atol=1e-12)
+
+    d3d = cam.clip_from_view.copy()
+    d3d[2] = (d3d[2] + d3d[3]) / 2.0
+    reversed_z = d3d.copy()
+    reversed_z[2] = d3d[3] - d3d[2]
+    device = [float(m[2, 2] * p_vs[2] + m[2, 3]) / w for m in (d3d, reversed_z)]
+    assert np.allclose((cam.near / (1.0 - device[0]), cam.near / device[1]), w, rtol=1e-12)
+    accepted = Camera.from_matrices(pose, reversed_z * 3.0, near=cam.near)
+    assert np.allclose(accepted.clip_from_view, cam.clip_from_view, rtol=1e-15)
+
+    lines = [
+        "world_from_view (camera.json)",
+        *matrix(pose),
+        "clip_from_view (camera.json)",
+        *matrix(cam.clip_from_view),
+        f"fx, fy, cx, cy      {vector((view.fx, view.fy, view.cx, view.cy))} px",
+        "",
+        "by the package",
+        f"  p_ws              {vector(p_ws)}",
+        f"  p_vs = R(p - eye) {vector(p_vs)}",
+        f"  depth = -z        {number(-p_vs[2])}",
+        f"  clip (x, y, w)    {vector((x, y, w))}",
+        f"  ndc (x, y)        {vector((x / w, y / w))}",
+        f"  px                {vector((px, py))}",
+        f"  snapped, 1/256 px {space['snap'](view, False, x, y, w)}",
+        f"  pixel             ({math.floor(px)}, {math.floor(py)})",
+        f"  uv                {vector((px / size[0], py / size[1]))}",
+        "",
+        "by a GL-style matrix",
+        "view_from_world",
+        *matrix(view_from_world),
+        "clip_from_world = clip_from_view view_from_world",
+        *matrix(clip_from_world),
+        f"  clip (x, y, z, w) {vector(homogeneous)}",
+        f"  ndc (x, y, z)     {vector(ndc)}",
+        f"  px                {vector(by_matrix)}",
+        "",
+        "device depth of the point",
+        f"  OpenGL z_ndc      {number(ndc[2])}    depth = 2 near / (1 - z_ndc)",
+        f"  [0, 1]            {number(device[0])}    depth = near / (1 - d)",
+        f"  reversed          {number(device[1])}    depth = near / d",
+    ]
+    return "\n".join(lines)
+
+
+class Reads(list[Any]):
+    """A row of the front depths that notes which columns are read."""
+
+    def __init__(self, row: list[float], y: int, events: list[Any]) -> None:
+        super().__init__(row)
+        self.y, self.events = y, events
+
+    def __getitem__(self, x: Any) -> Any:
+        self.events.append(("pixel", x, self.y))
+        return super().__getitem__(x)
+
+
+PIXEL = (10, 26)
+
+
+def dda_example() -> str:
+    """One pixel's walk: DDA at stride 1, exact cells, DDA at stride 4 with its re-walk."""
+    scene = build("teapot")
+    frame = ssr_ref.render(scene, None, Settings(size=(64, 36)))
+    x, y = PIXEL
+    space = listings("dda.md", "def trace_pixel")
+    g, view = frame.gbuffer, frame.camera.params((64, 36))
+    assert g.normal_vs is not None
+    assert g.geo_normal_vs is not None
+    assert g.back_depth is not None
+    assert g.object_id is not None
+    normal, geo = g.normal_vs[y, x].tolist(), g.geo_normal_vs[y, x].tolist()
+    depth = float(g.depth[y, x])
+    chosen = frame.settings
+    _, ray = space["set_up_ray"](view, x, y, depth, normal, geo, chosen.max_distance)
+    d = space["ray_through"](view, x + 0.5, y + 0.5)
+    r = space["normalize"](space["reflect"](space["normalize"](d), space["normalize"](normal)))
+    lines = [
+        f"camera    fx = fy = {number(view.fx)}, cx = {number(view.cx)}, cy = {number(view.cy)}, "
+        f"near = {number(view.near)}",
+        f"settings  thickness = {number(chosen.thickness or 0.0)}, bias = {number(chosen.bias)}, "
+        f"max_distance = {number(chosen.max_distance or 0.0)}",
+        "",
+        f"pixel     {PIXEL}, P0 = {vector((ray.p0_x, ray.p0_y))}, "
+        f"object {int(g.object_id[y, x])} ({scene.nodes[int(g.object_id[y, x])].name})",
+        f"depth     {depth!r}",
+        f"normal    {vector(normal)} = geometric normal",
+        f"d         {vector(d)}",
+        f"O         {vector(ray.origin)}",
+        f"R         {vector(r)}",
+        f"bound     {End(ray.end).name}, S = {number(ray.s_end)}",
+        f"dP        {vector((ray.dp_x, ray.dp_y))}",
+        f"k0, dk    {ray.k0!r}, {ray.dk!r}",
+    ]
+    for title, options in (
+        ("DDA, stride 1", {}),
+        ("exact cells", {"tracer": "cells"}),
+        ("DDA, stride 4: the first interval is re-walked", {"stride": 4}),
+    ):
+        lines += ["", title, *walk_lines(scene, space, options)]
+    return "\n".join(lines)
+
+
+def walk_lines(scene: Scene, space: Space, options: dict[str, Any]) -> list[str]:
+    """A table of every slab test of one walk, and its outcome as the package gives it."""
+    x, y = PIXEL
+    frame = ssr_ref.render(scene, None, Settings(size=(64, 36), **options))
+    g, hits = frame.gbuffer, frame.hits
+    assert g.geo_normal_vs is not None
+    assert g.normal_vs is not None
+    assert g.back_depth is not None
+    assert g.reflectivity is not None
+    view = frame.camera.params((64, 36))
+    events: list[Any] = []
+    noted = dict(space)
+    for block in re.findall(r"```python\n(.*?)```", page("dda.md"), re.DOTALL):
+        if "def trace_pixel" in block:
+            exec(block, noted)
+    depth_at, compare = noted["depth_at"], noted["compare_with_slab"]
+
+    def noted_depth_at(ray: Any, s: float) -> Any:
+        events.append(("s", s))
+        return depth_at(ray, s)
+
+    def noted_compare(z_a: float, z_b: float, low: float, back: float) -> Any:
+        verdict = compare(z_a, z_b, low, back)
+        (a, b) = [event[1] for event in events if event[0] == "s"][-2:]
+        cell = [event[1:] for event in events if event[0] == "pixel"][-1]
+        events.append(("test", cell, a, b, z_a, z_b, low, back, verdict))
+        return verdict
+
+    noted["depth_at"], noted["compare_with_slab"] = noted_depth_at, noted_compare
+    buffers = SimpleNamespace(
+        depth=g.depth.tolist(),
+        normal=g.normal_vs.tolist(),
+        geo_normal=g.geo_normal_vs.tolist(),
+        reflectivity=g.reflectivity.tolist(),
+        back=g.back_depth.tolist(),
+    )
+    front = noted["prepare_targets"](view, buffers.depth, buffers.geo_normal)
+    front = [Reads(row, i, events) for i, row in enumerate(front)]
+    out = noted["trace_pixel"](view, buffers, front, listing_settings(frame), x, y)
+
+    columns = ("pixel", "s from", "s to", "ray depth", "ray depth", "front", "back")
+    lines = ["  " + "".join(f"{c:>13}" for c in columns) + "  verdict"]
+    for event in events:
+        if event[0] == "test":
+            _, cell, a, b, z_a, z_b, low, back, verdict = event
+            shown = [f"{v:.8f}" for v in (a, b, z_a, z_b, low)]
+            shown.append("none" if math.isinf(buffers.back[cell[1]][cell[0]]) else f"{back:.8f}")
+            name = ("miss", "behind", "in slab")[verdict]
+            lines.append("  " + "".join(f"{c:>13}" for c in (str(cell), *shown)) + f"  {name}")
+    assert (out.hit_px, out.steps, out.fetches) == (
+        tuple(hits.hit_px[y, x]),
+        hits.steps[y, x],
+        hits.fetches[y, x],
+    )
+    lines += [
+        f"  {Status(int(hits.status[y, x])).name}, flags {int(hits.flags[y, x])}, "
+        f"steps {int(hits.steps[y, x])}, fetches {int(hits.fetches[y, x])}",
+        f"  hit_px ({float(hits.hit_px[y, x, 0])!r}, {float(hits.hit_px[y, x, 1])!r})",
+        f"  hit_depth {float(hits.hit_depth[y, x])!r}, residual "
+        f"{float(hits.residual[y, x])!r}, length {float(hits.length[y, x])!r}",
+    ]
+    return lines
+
+
+EXAMPLES: dict[str, tuple[str, Callable[[], str]]] = {
+    "conventions": ("conventions.md", conventions_example),
+    "dda": ("dda.md", dda_example),
+}
+
+
+def example_pattern(name: str) -> re.Pattern[str]:
+    return re.compile(rf"(<!-- example: {name} -->\n```text\n)(.*?)(\n?```)", re.DOTALL)
+
+
+@pytest.mark.parametrize("name", sorted(EXAMPLES))
+def test_worked_examples(name: str) -> None:
+    where, make = EXAMPLES[name]
+    found = example_pattern(name).search(page(where))
+    assert found is not None
+    assert found.group(2) == make(), "python tests/test_docs.py writes the examples anew"
+
+
+# ---- Links -------------------------------------------------------------------------------------
+
+
+def test_relative_links_point_to_files() -> None:
+    pages = [*sorted(DOCS.glob("*.md")), *(p for p in [ROOT / "README.md"] if p.exists())]
+    assert len(pages) >= 6
+    for path in pages:
+        for target in re.findall(r"\]\(([^)\s]+)\)", path.read_text(encoding="utf-8")):
+            if not re.match(r"[a-z]+:", target):
+                assert (path.parent / target.split("#")[0]).exists(), f"{path.name}: {target}"
+
+
+def test_the_index_names_every_page() -> None:
+    index = page("README.md")
+    for path in DOCS.glob("*.md"):
+        assert path.name == "README.md" or f"]({path.name})" in index, path.name
+
+
+def write_examples() -> None:
+    for name, (where, make) in EXAMPLES.items():
+        text = make()
+        body = example_pattern(name).sub(lambda m, t=text: m[1] + t + "\n```", page(where))
+        (DOCS / where).write_text(body, encoding="utf-8")
+        print(f"{where}:\n{text}\n")
+
+
+if __name__ == "__main__":
+    sys.exit(write_examples())
