@@ -153,7 +153,7 @@ def compile_seconds() -> dict[str, float]:
     """Time that each driver's code took to compile or to load in this process, longest first."""
     found = {}
     for dispatcher in _DRIVERS:
-        metadata = getattr(dispatcher, "get_metadata", dict)() or {}
+        metadata: dict[Any, Any] = getattr(dispatcher, "get_metadata", dict)() or {}
         total = sum(
             timer.get("compiler_lock", 0.0) or timer.get("llvm_lock", 0.0)
             for timer in (m.get("timers", {}) for m in metadata.values())

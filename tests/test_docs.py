@@ -18,14 +18,27 @@ import numpy as np
 import pytest
 
 import ssr_ref
-from ssr_ref import Camera, Mesh, Node, Scene, Settings, View, camera, settings, transforms
+from ssr_ref import (
+    Camera,
+    Material,
+    Mesh,
+    Node,
+    Primitive,
+    Scene,
+    Settings,
+    View,
+    camera,
+    settings,
+    transforms,
+)
 from ssr_ref._jit import _fma_exact
-from ssr_ref.buffers import STATUS_OF_END, End, Flag, Status
+from ssr_ref.buffers import STATUS_OF_END, End, Flag, GBuffer, Status
 from ssr_ref.fileio.manifest import SCHEMA_VERSION
 from ssr_ref.pipeline import Frame
 from ssr_ref.raster import attributes, clip, coverage, geometry
 from ssr_ref.scenes import build
 from ssr_ref.ssr import fade, march_cells
+from ssr_ref.ssr.trace import trace
 from ssr_ref.vecmath.elementary import pow as power
 from ssr_ref.vecmath.noise import jitter, pcg3d
 
@@ -170,10 +183,90 @@ def test_the_listing_of_the_tracer_gives_the_same_bytes(
 ) -> None:
     frame = ssr_ref.render(build("teapot", 3), view, Settings(size=(37, 23), **options))
     assert (frame.hits.status == Status.HIT).sum() > 10
+    check_trace(frame)
+
+
+def check_trace(frame: Frame) -> None:
     traced = trace_by_listing(listings("dda.md", "def trace_pixel"), frame)
     for name, expected in frame.hits.arrays().items():
         got = np.array([[getattr(out, name) for out in row] for row in traced], expected.dtype)
         assert got.tobytes() == expected.tobytes(), name
+
+
+def nearly_tangent_rays(frame: Frame, seed: int) -> Frame:
+    """The frame with rays that barely leave their surface, and depths off by about rule 4.5's ε."""
+    rng = np.random.default_rng(seed)
+    g = frame.gbuffer
+    assert g.geo_normal_vs is not None
+    view = frame.camera.params(frame.settings.size)
+    px = np.stack(np.meshgrid(*(np.arange(n) + 0.5 for n in frame.settings.size)), axis=2)
+    d = np.stack([(px[..., 0] - view.cx) / view.fx, (view.cy - px[..., 1]) / view.fy], axis=2)
+    d = np.concatenate([d, -np.ones((*d.shape[:2], 1))], axis=2)
+    if not view.perspective:
+        d[..., :2] = 0.0
+    n = g.geo_normal_vs.astype(np.float64)
+    along = np.cross(n, rng.normal(size=n.shape))
+    along = unit(along) + n * 2.0 ** rng.uniform(-16, -4, (*n.shape[:2], 1))
+    normal = np.where(n.any(axis=2, keepdims=True), unit(unit(along) - unit(d)), 0.0)
+    scale = 1.0 + rng.normal(size=g.depth.shape) * 2.0 ** rng.uniform(-16, -6, g.depth.shape)
+    dtype = g.depth.dtype
+    ones = np.ones_like(normal, dtype)
+    changed = replace(
+        g,
+        depth=(g.depth * scale).astype(dtype),
+        normal_vs=normal.astype(dtype),
+        reflectivity=ones,
+    )
+    return replace(frame, gbuffer=changed, hits=trace(view, changed, frame.settings))
+
+
+def unit(v: np.ndarray) -> np.ndarray:
+    squared: np.ndarray = (v * v).sum(axis=2, keepdims=True)
+    return v / np.sqrt(np.where(squared > 0.0, squared, 1.0))
+
+
+def diagonal_rays(seed: int, **options: Any) -> Frame:
+    """Orthographic, every ray at 45° across the pixels: it passes through their corners."""
+    rng = np.random.default_rng(seed)
+    shape = (17, 17)
+    chosen = Settings(size=shape, max_distance=6.0, thickness=0.05, **options)
+    cam = Camera.orthographic(transforms.identity(), 17.0, 1.0, near=0.5, far=9.0)
+    up = np.zeros((*shape, 3), np.float32)
+    up[..., 2] = 1.0
+    tilt = np.empty((*shape, 3), np.float32)
+    tilt[..., :2] = rng.choice([-0.5, 0.5], (*shape, 2))
+    tilt[..., 2] = rng.choice([0.75, 1.0, 4.0], shape)
+    tilt[rng.random(shape) < 0.1] = (0.0, 0.0, 1.0)  # back along the view axis
+    depth = np.where(rng.random(shape) < 0.1, np.inf, 2.0 - rng.random(shape) ** 4)
+    back = np.where(rng.random(shape) < 0.5, np.inf, depth + 0.2)
+    g = GBuffer(
+        depth=depth.astype(np.float32),
+        triangle_id=np.zeros(shape, np.int32),
+        back_depth=back.astype(np.float32),
+        geo_normal_vs=up,
+        normal_vs=tilt,
+        reflectivity=np.ones((*shape, 3), np.float32),
+    )
+    hits = trace(cam.params(shape), g, chosen)
+    return SimpleNamespace(settings=chosen, camera=cam, gbuffer=g, hits=hits)  # type: ignore
+
+
+@pytest.mark.parametrize("view", [None, ORTHOGRAPHIC])
+def test_the_listing_gives_the_same_bytes_for_nearly_tangent_rays(view: View | None) -> None:
+    options = {"thickness": 2.0**-8, "thickness_from": "constant"}
+    frame = ssr_ref.render(build("teapot", 3), view, Settings(size=(37, 23), **options))
+    frame = nearly_tangent_rays(frame, seed=3)
+    rejected = (frame.hits.flags & np.uint8(Flag.SELF_REJECTED)) != 0
+    assert rejected.sum() > 20
+    assert (frame.hits.status == Status.HIT).sum() > 20
+    check_trace(frame)
+
+
+@pytest.mark.parametrize("options", [{"tracer": "cells"}, {"interval": "cell"}, {"stride": 3}])
+def test_the_listing_gives_the_same_bytes_on_diagonals(options: dict[str, Any]) -> None:
+    frame = diagonal_rays(5, **options)
+    assert (frame.hits.status == Status.HIT).sum() > 50
+    check_trace(frame)
 
 
 # ---- The specification's listings --------------------------------------------------------------
@@ -310,6 +403,42 @@ def varied_scene() -> Scene:
     return replace(scene, meshes=meshes, materials=materials, nodes=tuple(nodes))
 
 
+def soup(seed: int) -> Scene:
+    """Small, steep and large triangles; half of the vertices lie on pixel centres of FLAT."""
+    rng = np.random.default_rng(seed)
+    count = 240
+    size = 2.0 ** rng.uniform(-3, 3, (count, 1, 1))
+    positions = rng.uniform(-9, 9, (count, 1, 3)) + size * rng.normal(size=(count, 3, 3))
+    positions[:, :, 2] = positions[:, :, 2] / 4 - 3
+    positions[: count // 2, :, :2] = np.floor(positions[: count // 2, :, :2]) + 0.5
+    positions[: count // 4, :, 2] = np.round(positions[: count // 4, :, 2])
+    colors = rng.random((count, 3, 3))
+    colors[::2] = colors[::2, :1]
+    normals = rng.normal(size=(count, 3, 3))
+    normals[::3] = normals[::3, :1]
+    parts = [
+        Primitive(
+            p.reshape(-1, 3).astype(np.float32),
+            np.arange(3 * len(p), dtype=np.int32).reshape(-1, 3),
+            i % 2,
+            normals=n.reshape(-1, 3).astype(np.float32) if i != 1 else None,
+            colors=c.reshape(-1, 3).astype(np.float32) if i != 2 else None,
+        )
+        for i, (p, n, c) in enumerate(
+            zip(np.split(positions, 4), np.split(normals, 4), np.split(colors, 4))
+        )
+    ]
+    materials = (
+        Material("one", metallic=0.5, double_sided=True, roughness=0.0),
+        Material("two", reflectivity=(0.5, 0.0, 1.0), emissive=(0.1, 0.0, 0.0)),
+    )
+    nodes = (Node("a", 0), Node("b", 1), Node("c", 2), Node("d", 3))
+    return Scene(tuple(Mesh(n.name, (p,)) for n, p in zip(nodes, parts)), nodes, materials)
+
+
+FLAT = View((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), orthographic_height=19.0, near=0.5)
+DEEP = View((0.0, 0.5, 2.0), (0.3, 0.0, -3.0), fov_y_degrees=120.0, near=3.0, far=7.0)
+
 RENDERS: list[tuple[Callable[[], Scene], View | None, dict[str, Any]]] = [
     (lambda: build("teapot", 2), None, {}),
     (
@@ -326,6 +455,8 @@ RENDERS: list[tuple[Callable[[], Scene], View | None, dict[str, Any]]] = [
     (varied_scene, ORTHOGRAPHIC, {"back_any_object": True, "edge_fade": False}),
     (varied_scene, INSIDE, {"distance_fade": "published", "edge_power": 1.5, "fresnel": True}),
     (lambda: build("poles", 2), View((1.5, 1.0, 2.0), (0.0, 0.3, 0.0), far=3.5), {}),
+    (lambda: soup(1), FLAT, {"buffer_dtype": "float64"}),
+    (lambda: soup(2), DEEP, {"buffer_dtype": "float64", "back_any_object": True}),
 ]
 
 
