@@ -1,6 +1,6 @@
 """Start-up: import, each driver's compile time, first render and second render in new processes.
 
-    python -m benchmarks.startup
+python -m benchmarks.startup
 """
 
 from __future__ import annotations

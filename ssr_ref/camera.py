@@ -338,12 +338,20 @@ class Camera:
     @staticmethod
     def from_json(data: Any) -> Camera:
         """A camera from `to_json`'s dictionary. Raises CameraError naming the element."""
+        _check_object(data)
         world = _matrix_from_json(data, "world_from_view")
         clip = _matrix_from_json(data, "clip_from_view")
         near, far = data.get("near"), data.get("far")
-        if not isinstance(near, int | float):
+        if not isinstance(near, int | float) or isinstance(near, bool):
             raise CameraError(f"camera 'near' is {near}; expected a number above 0")
+        if far is not None and (not isinstance(far, int | float) or isinstance(far, bool)):
+            raise CameraError(f"camera 'far' is {far}; expected a number above near, or null")
         return Camera(world, clip, float(near), np.inf if far is None else float(far))
+
+
+def _check_object(data: Any) -> None:
+    if not isinstance(data, dict):
+        raise CameraError(f"camera is a {type(data).__name__}; expected a JSON object")
 
 
 def _hex_rows(m: F64Array) -> list[list[str]]:
@@ -359,7 +367,12 @@ def _matrix_from_json(data: Any, name: str) -> F64Array:
     _check_shape(m, name)
     twin = data.get(name + "_hex")
     if twin is not None:
-        exact = np.array([[float.fromhex(v) for v in row] for row in twin])
+        try:
+            exact = np.array([[float.fromhex(v) for v in row] for row in twin])
+        except (TypeError, ValueError):
+            raise CameraError(
+                f"camera '{name}_hex' is {twin}; expected 4 rows of 4 hexadecimal numbers"
+            ) from None
         if exact.shape != m.shape or not np.array_equal(exact, m):
             raise CameraError(
                 f"camera '{name}' and '{name}_hex' differ; expected the same numbers: remove the "
@@ -530,6 +543,7 @@ class View:
     @staticmethod
     def from_json(data: Any) -> View:
         """A view from a dictionary with the field's names. Raises CameraError naming the key."""
+        _check_object(data)
         names = set(View.__dataclass_fields__)
         unknown = set(data) - names
         if unknown:
