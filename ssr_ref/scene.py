@@ -261,10 +261,12 @@ class Scene:
     def radius(self) -> float:
         """Half the diagonal of the world bounds, rounded to a power of two (nearest in log)."""
         low, high = self.world_bounds()
-        d = (high - low) / 2
-        r = float(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
-        if r == 0.0:
+        d = high / 2 - low / 2
+        largest = float(d.max())
+        if largest == 0.0:
             return 1.0
+        d = d / largest
+        r = largest * float(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
         mantissa, exponent = np.frexp(r)
         power = int(exponent) if mantissa * mantissa >= 0.5 else int(exponent) - 1
         return float(np.ldexp(1.0, power))

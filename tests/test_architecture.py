@@ -118,7 +118,7 @@ def banned(tree: ast.AST) -> list[str]:
             owner = ast.unparse(node.value)
             if owner in ("np", "numpy") and node.attr in LIBM | BLAS:
                 found.append(f"line {line}: {owner}.{node.attr}")
-            if owner == "math" or node.attr in TRIMESH | {"dot"} and owner not in ("vec",):
+            if owner == "math" or node.attr in TRIMESH | {"dot"}:
                 found.append(f"line {line}: {owner}.{node.attr}")
             if owner.endswith("linalg"):
                 found.append(f"line {line}: {owner}.{node.attr}")

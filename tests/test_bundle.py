@@ -624,3 +624,32 @@ def test_finite_range():
 
 def test_the_box_scene_is_what_the_helper_says():
     assert box_scene().triangle_count == 14 and len(box_scene().nodes) == 2
+
+
+@pytest.mark.parametrize("size", [(960, 540), (1920, 1080), (37, 23), (1, 1), (16384, 3)], ids=str)
+def test_stored_hits_stay_in_their_texel(size: tuple[int, int]) -> None:
+    """Float32 rounding of a hit an ulp before a border must not name the neighbour's texel."""
+    from ssr_ref.fileio.manifest import stored_arrays
+
+    width, height = size
+    rng = np.random.default_rng(3)
+    frame = made_up_frame((37, 23))
+    texel = np.stack(
+        [rng.integers(0, width, (23, 37)), rng.integers(0, height, (23, 37))], axis=-1
+    ).astype(np.float64)
+    hit_px = np.nextafter(texel + 1.0, 0.0)  # the worst place: one float64 ulp inside
+    hit_px[::3] = texel[::3]  # exactly on the near border
+    hit_px[1::3] = texel[1::3] + rng.random((8, 37, 2))
+    frame = replace(
+        frame,
+        hits=replace(frame.hits, hit_px=hit_px),
+        settings=replace(frame.settings, size=size),
+    )
+    stored = stored_arrays(frame)
+    scale = np.array([width, height])
+    assert stored["hit_px"].dtype == np.float32
+    assert np.array_equal(np.floor(stored["hit_px"]), texel)
+    for product in (stored["hit_uv"] * scale.astype(np.float32), stored["hit_uv"] * scale):
+        assert np.array_equal(np.floor(product), texel)
+    # The move is of float32 rounding's own size: 2⁻²⁴ relative, a few times.
+    assert np.abs(stored["hit_px"] - hit_px).max() <= 2.0**-22 * max(size)

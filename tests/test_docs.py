@@ -229,7 +229,7 @@ def diagonal_rays(seed: int, **options: Any) -> Frame:
     """Orthographic, every ray at 45° across the pixels: it passes through their corners."""
     rng = np.random.default_rng(seed)
     shape = (17, 17)
-    chosen = Settings(size=shape, max_distance=6.0, thickness=0.05, **options)
+    chosen = Settings(size=shape, max_distance=6.0, thickness=0.25, **options)
     cam = Camera.orthographic(transforms.identity(), 17.0, 1.0, near=0.5, far=9.0)
     up = np.zeros((*shape, 3), np.float32)
     up[..., 2] = 1.0
@@ -237,7 +237,7 @@ def diagonal_rays(seed: int, **options: Any) -> Frame:
     tilt[..., :2] = rng.choice([-0.5, 0.5], (*shape, 2))
     tilt[..., 2] = rng.choice([0.75, 1.0, 4.0], shape)
     tilt[rng.random(shape) < 0.1] = (0.0, 0.0, 1.0)  # back along the view axis
-    depth = np.where(rng.random(shape) < 0.1, np.inf, 2.0 - rng.random(shape) ** 4)
+    depth = np.where(rng.random(shape) < 0.1, np.inf, 2.5 - rng.random(shape))
     back = np.where(rng.random(shape) < 0.5, np.inf, depth + 0.2)
     g = GBuffer(
         depth=depth.astype(np.float32),
@@ -265,7 +265,7 @@ def test_the_listing_gives_the_same_bytes_for_nearly_tangent_rays(view: View | N
 @pytest.mark.parametrize("options", [{"tracer": "cells"}, {"interval": "cell"}, {"stride": 3}])
 def test_the_listing_gives_the_same_bytes_on_diagonals(options: dict[str, Any]) -> None:
     frame = diagonal_rays(5, **options)
-    assert (frame.hits.status == Status.HIT).sum() > 50
+    assert (frame.hits.status == Status.HIT).sum() > 30
     check_trace(frame)
 
 
@@ -322,10 +322,7 @@ def draw_by_listing(space: Space, frame: Frame) -> dict[str, Any]:
         name: [[(0.0, 0.0, 0.0)] * view.width for _ in range(view.height)] for name in names
     }
     for y, x, t in visible(triangle):
-        first = x
-        while first > 0 and triangle[y][first - 1] == t:
-            first -= 1
-        geo, behind = space["geometric_normal"](view, shapes, t, first, y)
+        geo, behind = space["geometric_normal"](view, shapes, t)
         b = space["weights"](view, shapes, t, x, y) if shapes.varies(t) else (1.0, 0.0, 0.0)
         n_ws = space["shading_normal_ws"](shapes, t, b, behind)
         albedo = space["base_color"](shapes, t, b)
@@ -410,8 +407,15 @@ def soup(seed: int) -> Scene:
     size = 2.0 ** rng.uniform(-3, 3, (count, 1, 1))
     positions = rng.uniform(-9, 9, (count, 1, 3)) + size * rng.normal(size=(count, 3, 3))
     positions[:, :, 2] = positions[:, :, 2] / 4 - 3
-    positions[: count // 2, :, :2] = np.floor(positions[: count // 2, :, :2]) + 0.5
+    positions[: count // 2, :, :2] = np.floor(positions[: count // 2, :, :2])
     positions[: count // 4, :, 2] = np.round(positions[: count // 4, :, 2])
+    positions[20:40] = positions[:20]  # coplanar: the lower id is seen
+    # Steep slivers that snapping moves onto a pixel centre, which they miss: a depth is clamped.
+    thin = positions[-40:]
+    thin[:, :, :2] = np.floor(rng.uniform(-9, 9, (40, 1, 2)))
+    thin[:, :, 0] += [0.0006, 0.004, 0.0006]
+    thin[:, :, 1] += [-2.0, -2.0, 3.0]
+    thin[:, :, 2] = rng.uniform(-2, -1, (40, 1)) - [0.0, 5.0, 0.0]
     colors = rng.random((count, 3, 3))
     colors[::2] = colors[::2, :1]
     normals = rng.normal(size=(count, 3, 3))
@@ -466,6 +470,9 @@ def test_the_listings_of_the_specification_give_the_same_bytes(
 ) -> None:
     frame = ssr_ref.render(scene(), view, Settings(size=(33, 19), **options))
     space = listings("specification.md", "def to_view")
+    if options.get("buffer_dtype") == "float64":
+        assert frame.gbuffer.counts.zero_area > 0
+        assert (frame.gbuffer.counts.clamped_depths > 0) == (view is FLAT)
     images = draw_by_listing(space, frame) | resolve_by_listing(space, frame)
     stored = frame.gbuffer.arrays() | frame.resolved.arrays()
     for name, image in images.items():

@@ -29,7 +29,9 @@ VARIANTS = [
 VIEWS = {
     "own": None,
     "orthographic": ssr_ref.View((1.0, 1.5, 3.0), (0.0, 0.3, 0.0), orthographic_height=3.0),
-    "close": ssr_ref.View((0.0, 0.15, 1.2), (0.0, 0.1, 0.0), fov_y_degrees=120.0, jitter=(0.3, -0.4)),
+    "close": ssr_ref.View(
+        (0.0, 0.15, 1.2), (0.0, 0.1, 0.0), fov_y_degrees=120.0, jitter=(0.3, -0.4)
+    ),
     "away": ssr_ref.View((0.0, 50.0, 0.0), (0.0, 60.0, 1.0)),
 }
 

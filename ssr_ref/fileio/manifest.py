@@ -88,7 +88,29 @@ def stored_arrays(frame: Frame) -> dict[str, AnyArray]:
             if name in found:
                 raise BundleError(f"two buffers are named {name}; expected names of their own")
             found[name] = _stored(array, floats)
+    if floats is np.float32:
+        texel = np.floor(frame.hits.hit_px)
+        ones = np.ones(2, np.float32)
+        found["hit_px"] = _within_texel(found["hit_px"], ones, texel)
+        found["hit_uv"] = _within_texel(
+            found["hit_uv"], np.array([width, height], np.float32), texel
+        )
     return dict(sorted(found.items()))
+
+
+def _within_texel(stored: AnyArray, scale: AnyArray, texel: AnyArray) -> AnyArray:
+    """`stored` moved by the few float32 steps after which floor(stored · scale) is `texel`.
+
+    A hit an ulp before a pixel's border rounds onto the border, and who takes the texel from the
+    file would read the neighbour. Both float32 and float64 products are made to agree.
+    """
+    out = stored.copy()
+    for _ in range(8):
+        least = np.minimum(np.floor(out * scale), np.floor(out.astype(np.float64) * scale))
+        most = np.maximum(np.floor(out * scale), np.floor(out.astype(np.float64) * scale))
+        out = np.where(most > texel, np.nextafter(out, np.float32(-np.inf)), out)
+        out = np.where(least < texel, np.nextafter(out, np.float32(np.inf)), out)
+    return out
 
 
 def _stored(array: AnyArray, floats: Any) -> AnyArray:

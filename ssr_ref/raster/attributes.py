@@ -12,7 +12,7 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, kernel
-from ..camera import ViewParams, ray_through, rotate_to_view
+from ..camera import ViewParams, rotate_to_view
 from ..typed import F32Array, F64Array, FloatArray, I32Array, I64Array
 from ..vecmath.vec import Vec3, dot, normalize
 from .geometry import DOUBLE_SIDED, HAS_COLORS, HAS_NORMALS, Geometry
@@ -40,8 +40,9 @@ class SurfaceRun(NamedTuple):
     frame: BarycentricFrame
     geo_normal_vs: Vec3  # unit, faces the eye
     back_side: bool  # a double-sided face seen from behind
-    smooth: bool  # the shading normal varies, or is not the geometric one
-    varies: bool  # some attribute differs between the vertices
+    smooth: bool  # the vertices have normals
+    normal_varies: bool  # and they differ
+    varies: bool  # the normals or the colours differ
 
 
 @kernel
@@ -55,34 +56,34 @@ def rows_equal(array: F64Array | F32Array, i: int, j: int, k: int) -> bool:
 
 @kernel
 def begin_run(
-    view: ViewParams, geometry: Geometry, positions_vs: F64Array, t: int, x: int, y: int
+    view: ViewParams, geometry: Geometry, positions_vs: F64Array, t: int
 ) -> SurfaceRun:
-    """Set up triangle t, whose first pixel of the run is (x, y)."""
+    """Set up triangle t."""
     i0, i1, i2 = geometry.faces[t, 0], geometry.faces[t, 1], geometry.faces[t, 2]
     v0, v1, v2 = load(positions_vs, i0), load(positions_vs, i1), load(positions_vs, i2)
     plane = nearness_plane(view, v0, v1, v2)
     frame = barycentric_frame(v0, v1, v2)
-    n = unit_or_facing(view, plane_normal(v0, v1, v2), x, y)
+    n = unit_or_facing(view, plane_normal(v0, v1, v2), v0)
     # The side seen is that of the plane: n·v is the same at every point of it.
     side = dot(n, v0) if view.perspective else -n.z
     back_side = side > 0.0 and (geometry.triangle_flags[t] & DOUBLE_SIDED) != 0
     if side > 0.0:
         n = Vec3(-n.x, -n.y, -n.z)
     smooth = (geometry.triangle_flags[t] & HAS_NORMALS) != 0
-    varies = smooth and not rows_equal(geometry.normals_ws, i0, i1, i2)
+    normal_varies = smooth and not rows_equal(geometry.normals_ws, i0, i1, i2)
+    varies = normal_varies
     if (geometry.triangle_flags[t] & HAS_COLORS) != 0:
         varies = varies or not rows_equal(geometry.colors, i0, i1, i2)
-    return SurfaceRun(plane, frame, n, back_side, smooth, varies)
+    return SurfaceRun(plane, frame, n, back_side, smooth, normal_varies, varies)
 
 
 @kernel
-def unit_or_facing(view: ViewParams, n: Vec3, x: int, y: int) -> Vec3:
-    """Unit n, or the direction to the eye where n has no direction (a triangle without area)."""
+def unit_or_facing(view: ViewParams, n: Vec3, v0: Vec3) -> Vec3:
+    """Unit n; the direction from v0 to the eye if n has none (a triangle without area)."""
     largest = max(abs(n.x), abs(n.y), abs(n.z))
     if np.isfinite(largest) and largest > 0.0:
         return normalize(Vec3(n.x / largest, n.y / largest, n.z / largest))
-    d = ray_through(view, x + 0.5, y + 0.5)
-    return normalize(Vec3(-d.x, -d.y, -d.z))
+    return normalize(Vec3(-v0.x, -v0.y, -v0.z)) if view.perspective else Vec3(0.0, 0.0, 1.0)
 
 
 @kernel
@@ -114,7 +115,7 @@ def shading_normal_ws(
     squared = dot(n, n)
     if not (np.isfinite(squared) and squared > 0.0):
         return False, Vec3(0.0, 0.0, 0.0)
-    if run.varies:
+    if run.normal_varies:
         n = normalize(n)
     if run.back_side:
         n = Vec3(-n.x, -n.y, -n.z)
@@ -178,7 +179,7 @@ def shade_normals(
                             normal_vs[y, j, c] = 0.0
                 x = end
                 continue
-            run = begin_run(view, geometry, positions_vs, t, x, y)
+            run = begin_run(view, geometry, positions_vs, t)
             g = run.geo_normal_vs
             for j in range(np.uint64(x), np.uint64(end)):
                 geo_normal_vs[y, j, 0] = g.x
@@ -186,14 +187,14 @@ def shade_normals(
                 geo_normal_vs[y, j, 2] = g.z
             if want_shading:
                 n = g
-                if run.smooth and not run.varies:
+                if run.smooth and not run.normal_varies:
                     usable, n_ws = shading_normal_ws(geometry, run, t, Barycentric(1.0, 0.0, 0.0))
                     if usable:
                         n = rotate_to_view(view, n_ws)
                     else:
                         bad += end - x
                 for j in range(np.uint64(x), np.uint64(end)):
-                    if run.smooth and run.varies:
+                    if run.normal_varies:
                         b = weights_at(view, run, j, y)
                         usable, n_ws = shading_normal_ws(geometry, run, t, b)
                         n = g
@@ -250,7 +251,7 @@ def shade_materials(
             r = normal_reflectivity(geometry, t, a, fresnel, max_roughness)
             m = geometry.triangle_material[t]
             if varies:
-                run = begin_run(view, geometry, positions_vs, t, x, y)
+                run = begin_run(view, geometry, positions_vs, t)
                 for j in range(np.uint64(x), np.uint64(end)):
                     a = base_color(geometry, t, weights_at(view, run, j, y))
                     r = normal_reflectivity(geometry, t, a, fresnel, max_roughness)

@@ -97,7 +97,7 @@ def shade_radiance(
                     store3(radiance, y, j, Vec3(0.0, 0.0, 0.0))
                 x = end
                 continue
-            run = begin_run(view, geometry, positions_vs, t, x, y)
+            run = begin_run(view, geometry, positions_vs, t)
             flat = flat_normal_ws(geometry, t, run.back_side)
             m = geometry.triangle_material[t]
             emissive = load(geometry.emissive, m)

@@ -37,8 +37,12 @@ def schlick(f0: float, cosine: float) -> float:
 
 @kernel
 def reflectance(view: ViewParams, x: int, y: int, f0: Vec3, normal: Vec3, fresnel: bool) -> Vec3:
-    """R of a pixel: its reflectivity, with Schlick's term for the angle of view if `fresnel`."""
-    if not fresnel:
+    """R of a pixel: its reflectivity, with Schlick's term for the angle of view if `fresnel`.
+
+    A normal that is zero or not finite has no angle: R is the reflectivity.
+    """
+    squared = dot(normal, normal)
+    if not fresnel or not (squared > 0.0 and np.isfinite(squared)):
         return f0
     d = ray_through(view, x + 0.5, y + 0.5)
     cosine = -dot(normalize(d), normalize(normal))
