@@ -12,7 +12,6 @@ import numpy as np
 
 from ssr_ref.raster import rasterize as R
 from ssr_ref.raster.geometry import flatten
-from ssr_ref.settings import Settings
 
 from .common import machine, median_ms
 from .scenes import GOAL_MS, scene

@@ -31,18 +31,21 @@ VIEW = front_view(False, SIZE)
 @numba.njit(error_model="numpy")
 def record(view: ViewParams, rules: SlabRules, ray: Ray, out: np.ndarray) -> int:
     """Rows of out: x, y, s at entry, of each walked cell; returns how many there are."""
-    front = np.full((view.height, view.width), np.float32(1.0))
+    depth = np.full((view.height, view.width), np.float32(1.0))
+    slabs = np.empty((view.height, view.width, 2))
+    slabs[..., 0] = 1.0
+    slabs[..., 1] = 1.0 + rules.thickness
     back = np.empty((0, 0), np.float32)
     normal = np.zeros((view.height, view.width, 3), np.float32)
     n = 0
     while True:
-        walk = march_cells(view, rules, front, back, normal, ray, 2**62)
+        walk = march_cells(view, rules, slabs, depth, back, normal, ray, 2**62)
         if not walk.hit.found:
             # Now all are empty: the count of tested cells must be the number recorded.
             return n if walk.cells == n else -1
         x, y = int(walk.hit.px), int(walk.hit.py)
         out[n, 0], out[n, 1], out[n, 2] = x, y, walk.hit.s
-        front[y, x] = np.inf
+        slabs[y, x] = np.inf
         n += 1
 
 

@@ -55,9 +55,7 @@ def rows_equal(array: F64Array | F32Array, i: int, j: int, k: int) -> bool:
 
 
 @kernel
-def begin_run(
-    view: ViewParams, geometry: Geometry, positions_vs: F64Array, t: int
-) -> SurfaceRun:
+def begin_run(view: ViewParams, geometry: Geometry, positions_vs: F64Array, t: int) -> SurfaceRun:
     """Set up triangle t."""
     i0, i1, i2 = geometry.faces[t, 0], geometry.faces[t, 1], geometry.faces[t, 2]
     v0, v1, v2 = load(positions_vs, i0), load(positions_vs, i1), load(positions_vs, i2)

@@ -15,7 +15,7 @@ import numpy as np
 from .._jit import kernel
 from ..buffers import Flag
 from ..camera import ViewParams, point_at, ray_through
-from ..typed import FloatArray
+from ..typed import F64Array, FloatArray
 from ..vecmath.vec import Vec3, dot
 from .ray import Ray, depth_at, position_x, position_y, s_of_depth
 
@@ -104,6 +104,13 @@ def compare_with_slab(z_a: float, z_b: float, low: float, back: float) -> int:
     if near > back:
         return BEHIND
     return IN_SLAB if far >= low else MISS
+
+
+@kernel
+def load_slab(slabs: F64Array, depth: FloatArray, back: FloatArray, x: int, y: int) -> Slab:
+    """The slab of pixel (x, y), which is not empty."""
+    is_open = back.shape[0] == 0 or not back[y, x] < np.inf
+    return Slab(np.float64(depth[y, x]), slabs[y, x, 1], OPEN if is_open else 0)
 
 
 @kernel

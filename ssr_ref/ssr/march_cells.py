@@ -14,20 +14,19 @@ import numpy as np
 
 from .._jit import kernel
 from ..camera import ViewParams
-from ..typed import FloatArray
+from ..typed import F64Array, FloatArray
 from .hit import (
     BEHIND,
     IN_SLAB,
-    OPEN,
     OVER_EMPTY,
     PASSED_BEHIND,
     SELF_REJECTED,
     Hit,
-    Slab,
     SlabRules,
     above_tangent_plane,
     compare_with_slab,
     load3,
+    load_slab,
     locate_hit,
     no_hit,
 )
@@ -69,7 +68,8 @@ def cell_before(p: float, dp: float) -> int:
 def walk_cells(
     view: ViewParams,
     rules: SlabRules,
-    front: FloatArray,
+    slabs: F64Array,
+    depth: FloatArray,
     back: FloatArray,
     normal: FloatArray,
     ray: Ray,
@@ -86,13 +86,15 @@ def walk_cells(
 
     skip_first: the first cell is the origin's own and is neither tested nor counted.
     """
-    has_back = back.shape[0] > 0
+    reads = 2 if back.shape[0] > 0 else 1  # of a pixel that is not empty
     step_x = 1 if ray.dp_x > 0.0 else -1
     step_y = 1 if ray.dp_y > 0.0 else -1
     left_x = max(0, (x_last - x) * step_x) if ray.dp_x != 0.0 else 0
     left_y = max(0, (y_last - y) * step_y) if ray.dp_y != 0.0 else 0
     ahead_x = 1 if step_x > 0 else 0
     ahead_y = 1 if step_y > 0 else 0
+    outside_x = view.width if step_x > 0 else -1
+    outside_y = view.height if step_y > 0 else -1
     s_x = crossing(x + ahead_x, ray.p0_x, ray.dp_x) if left_x > 0 else np.inf
     s_y = crossing(y + ahead_y, ray.p0_y, ray.dp_y) if left_y > 0 else np.inf
     entry = a
@@ -101,37 +103,32 @@ def walk_cells(
     cells = 0
     fetches = 0
     first = skip_first
+    if x < 0 or y < 0 or x >= view.width or y >= view.height:
+        return CellWalk(no_hit(), 0, 0, 0, False)
     while True:
         # The cell is left where the nearer border is crossed, the last one at b.
         leave = min(s_x, s_y)
         leave = min(max(leave, entry), b)
         z_leave = depth_at(ray, leave)
         if not first:
-            if x < 0 or y < 0 or x >= view.width or y >= view.height:
-                break
             if cells == max_cells:
                 return CellWalk(no_hit(), flags, cells, fetches, True)
             cells += 1
-            fetches += 1
-            z_front = np.float64(front[y, x])
-            if z_front == np.inf:
+            low = slabs[y, x, 0]
+            verdict = compare_with_slab(z_entry, z_leave, low, slabs[y, x, 1])
+            if low == np.inf:
+                fetches += 1
                 flags |= OVER_EMPTY
             else:
-                z_back = z_front + rules.thickness
-                is_open = OPEN
-                if has_back:
-                    fetches += 1
-                    if back[y, x] < np.inf:
-                        z_back = np.float64(back[y, x])
-                        is_open = 0
-                verdict = compare_with_slab(z_entry, z_leave, z_front + rules.bias, z_back)
+                fetches += reads
                 if verdict == BEHIND:
                     flags |= PASSED_BEHIND
                 elif verdict == IN_SLAB:
+                    z_front = np.float64(depth[y, x])
                     if not rules.reject_self or above_tangent_plane(
                         view, rules.rounding, ray, x, y, z_front, load3(normal, y, x)
                     ):
-                        slab = Slab(z_front, z_back, is_open)
+                        slab = load_slab(slabs, depth, back, x, y)
                         hit = locate_hit(rules, ray, slab, x, y, entry, leave, True)
                         return CellWalk(hit, flags, cells, fetches, False)
                     flags |= SELF_REJECTED
@@ -140,10 +137,14 @@ def walk_cells(
             break
         if s_x <= s_y:
             x += step_x
+            if x == outside_x:
+                break
             left_x -= 1
             s_x = crossing(x + ahead_x, ray.p0_x, ray.dp_x) if left_x > 0 else np.inf
         else:
             y += step_y
+            if y == outside_y:
+                break
             left_y -= 1
             s_y = crossing(y + ahead_y, ray.p0_y, ray.dp_y) if left_y > 0 else np.inf
         entry = leave
@@ -155,7 +156,8 @@ def walk_cells(
 def march_cells(
     view: ViewParams,
     rules: SlabRules,
-    front: FloatArray,
+    slabs: F64Array,
+    depth: FloatArray,
     back: FloatArray,
     normal: FloatArray,
     ray: Ray,
@@ -167,7 +169,8 @@ def march_cells(
     return walk_cells(
         view,
         rules,
-        front,
+        slabs,
+        depth,
         back,
         normal,
         ray,
@@ -186,7 +189,8 @@ def march_cells(
 def rewalk(
     view: ViewParams,
     rules: SlabRules,
-    front: FloatArray,
+    slabs: F64Array,
+    depth: FloatArray,
     back: FloatArray,
     normal: FloatArray,
     ray: Ray,
@@ -202,5 +206,5 @@ def rewalk(
     y = ray.y if own else cell_after(position_y(ray, a), ray.dp_y)
     start = 0.0 if own else a
     return walk_cells(
-        view, rules, front, back, normal, ray, x, y, x_last, y_last, start, b, own, limit
+        view, rules, slabs, depth, back, normal, ray, x, y, x_last, y_last, start, b, own, limit
     )

@@ -33,16 +33,34 @@ NO_LIMIT = 2**62
 
 
 @driver()
-def prepare_targets(
-    view: ViewParams, depth: FloatArray, geo_normal: FloatArray, front: FloatArray
+def prepare_slabs(
+    view: ViewParams,
+    depth: FloatArray,
+    geo_normal: FloatArray,
+    back: FloatArray,
+    thickness: float,
+    bias: float,
+    slabs: F64Array,
 ) -> None:
-    """front = depth, +inf where a pixel cannot be hit: empty, bad depth, or facing away."""
+    """slabs (H, W, 2) = front + bias and back of every pixel, view depths.
+
+    back is the back-face depth where there is one, else front + thickness. Both are +inf where a
+    pixel cannot be hit: empty, bad depth, or facing away.
+    """
+    has_back = back.shape[0] > 0
     for y in prange(view.height):
         for x in range(view.width):
-            z = depth[y, x]
-            n = load3(geo_normal, y, x)
-            facing = dot(n, ray_through(view, x + 0.5, y + 0.5))
-            front[y, x] = z if z > 0.0 and facing < 0.0 else np.inf
+            z = np.float64(depth[y, x])
+            facing = dot(load3(geo_normal, y, x), ray_through(view, x + 0.5, y + 0.5))
+            low = np.inf
+            z_back = np.inf
+            if z > 0.0 and facing < 0.0:
+                low = z + bias
+                z_back = z + thickness
+                if has_back and back[y, x] < np.inf:
+                    z_back = np.float64(back[y, x])
+            slabs[y, x, 0] = low
+            slabs[y, x, 1] = z_back
 
 
 @kernel
@@ -72,7 +90,7 @@ def trace_rows(
     geo_normal: FloatArray,
     normal: FloatArray,
     reflectivity: FloatArray,
-    front: FloatArray,
+    slabs: F64Array,
     back: FloatArray,
     thickness: float,
     bias: float,
@@ -137,7 +155,8 @@ def trace_rows(
                 walk = march_dda(
                     view,
                     rules,
-                    front,
+                    slabs,
+                    depth,
                     back,
                     geo_normal,
                     ray,
@@ -148,7 +167,7 @@ def trace_rows(
                     max_steps,
                 )
             else:
-                walk = march_cells(view, rules, front, back, geo_normal, ray, max_steps)
+                walk = march_cells(view, rules, slabs, depth, back, geo_normal, ray, max_steps)
             steps[y, x] = walk.cells
             fetches[y, x] = walk.fetches
             flags[y, x] = walk.flags
@@ -184,12 +203,20 @@ def trace(
     assert gbuffer.normal_vs is not None
     assert gbuffer.reflectivity is not None
     shape = gbuffer.depth.shape
-    front = np.empty(shape, gbuffer.depth.dtype)
-    prepare_targets(view, gbuffer.depth, gbuffer.geo_normal_vs, front)
     back = np.empty((0, 0), gbuffer.depth.dtype)
     if settings.thickness_from == "back_faces":
         assert gbuffer.back_depth is not None
         back = gbuffer.back_depth
+    slabs = np.empty((*shape, 2))
+    prepare_slabs(
+        view,
+        gbuffer.depth,
+        gbuffer.geo_normal_vs,
+        back,
+        float(settings.thickness),
+        float(settings.bias),
+        slabs,
+    )
     hits = HitBuffer(
         status=np.empty(shape, np.uint8),
         end=np.empty(shape, np.uint8),
@@ -214,7 +241,7 @@ def trace(
         gbuffer.geo_normal_vs,
         gbuffer.normal_vs,
         gbuffer.reflectivity,
-        front,
+        slabs,
         back,
         float(settings.thickness),
         float(settings.bias),
