@@ -1,4 +1,4 @@
-"""Scenes of 5 thousand, 100 thousand and 1 million triangles: spheres and boxes on a mirror."""
+"""One scene at 5 thousand, 100 thousand and 1 million triangles: spheres and boxes on a mirror."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ GOAL_MS = {"S": 10.0, "M": 21.0, "L": 55.0}
 
 def scene(name: str) -> Scene:
     """S: 5 k, M: 100 k, L: 1 M triangles; covers more than 55 % of the picture."""
-    frequency, rows = {"S": (5, 3), "M": (24, 3), "L": (32, 7)}[name]
+    frequency, rows = {"S": (5, 3), "M": (24, 3), "L": (74, 3)}[name]
     sphere = Mesh("sphere", (shapes.sphere(0.45, frequency, material=1),))
     box = Mesh("box", (shapes.box((-0.15, 0.0, -0.15), (0.15, 0.6, 0.15), material=2),))
     corners = ((-20, 0, 20), (20, 0, 20), (20, 0, -20), (-20, 0, -20))

@@ -168,6 +168,13 @@ def kernel(function: F) -> F:
     return numba.njit(error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
+def inlined(function: F) -> F:
+    """A `kernel` that LLVM must inline, for small functions that take wide tuples: copying the
+    tuple to a call costs more than the work (measured: benchmarks/raster.py, scene L).
+    """
+    return numba.njit(error_model="numpy", forceinline=True)(function)  # type: ignore[no-any-return]
+
+
 def driver(*, parallel: bool = True) -> Callable[[F], F]:
     """Compile a function that owns loops and arrays; cached on disk, callable from any thread."""
 

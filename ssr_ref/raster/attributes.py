@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from .._jit import driver, kernel
+from .._jit import driver, inlined, kernel
 from ..camera import ViewParams, rotate_to_view
 from ..typed import F32Array, F64Array, FloatArray, I32Array, I64Array
-from ..vecmath.vec import Vec3, dot, normalize
+from ..vecmath.vec import Vec3, dot, normalize, scale
 from .geometry import DOUBLE_SIDED, HAS_COLORS, HAS_NORMALS, Geometry
 from .surface import (
     Barycentric,
@@ -28,6 +28,9 @@ from .surface import (
     run_end,
     surface_point,
 )
+
+SMALLEST_SQUARE, LARGEST_SQUARE = 2.0**-900, 2.0**900
+"""A squared length in between has lost nothing to overflow or underflow."""
 
 DIELECTRIC_F0 = 0.04
 """Reflectance at normal incidence of a dielectric of index 1.5: ((1.5 − 1)/(1.5 + 1))²."""
@@ -45,7 +48,7 @@ class SurfaceRun(NamedTuple):
     varies: bool  # the normals or the colours differ
 
 
-@kernel
+@inlined
 def rows_equal(array: F64Array | F32Array, i: int, j: int, k: int) -> bool:
     """Whether three rows of an (n, 3) array hold the same values."""
     for c in range(3):
@@ -54,14 +57,15 @@ def rows_equal(array: F64Array | F32Array, i: int, j: int, k: int) -> bool:
     return True
 
 
-@kernel
+@inlined
 def begin_run(view: ViewParams, geometry: Geometry, positions_vs: F64Array, t: int) -> SurfaceRun:
     """Set up triangle t."""
     i0, i1, i2 = geometry.faces[t, 0], geometry.faces[t, 1], geometry.faces[t, 2]
     v0, v1, v2 = load(positions_vs, i0), load(positions_vs, i1), load(positions_vs, i2)
-    plane = nearness_plane(view, v0, v1, v2)
-    frame = barycentric_frame(v0, v1, v2)
-    n = unit_or_facing(view, plane_normal(v0, v1, v2), v0)
+    normal = plane_normal(v0, v1, v2)
+    plane = nearness_plane(view, normal, v0, v1, v2)
+    frame = barycentric_frame(normal, v0, v1, v2)
+    n = unit_or_facing(view, normal, v0)
     # The side seen is that of the plane: n·v is the same at every point of it.
     side = dot(n, v0) if view.perspective else -n.z
     back_side = side > 0.0 and (geometry.triangle_flags[t] & DOUBLE_SIDED) != 0
@@ -75,22 +79,25 @@ def begin_run(view: ViewParams, geometry: Geometry, positions_vs: F64Array, t: i
     return SurfaceRun(plane, frame, n, back_side, smooth, normal_varies, varies)
 
 
-@kernel
+@inlined
 def unit_or_facing(view: ViewParams, n: Vec3, v0: Vec3) -> Vec3:
     """Unit n; the direction from v0 to the eye if n has none (a triangle without area)."""
+    squared = dot(n, n)
+    if SMALLEST_SQUARE < squared < LARGEST_SQUARE:
+        return scale(n, 1.0 / np.sqrt(squared))
     largest = max(abs(n.x), abs(n.y), abs(n.z))
     if np.isfinite(largest) and largest > 0.0:
         return normalize(Vec3(n.x / largest, n.y / largest, n.z / largest))
     return normalize(Vec3(-v0.x, -v0.y, -v0.z)) if view.perspective else Vec3(0.0, 0.0, 1.0)
 
 
-@kernel
+@inlined
 def weights_at(view: ViewParams, run: SurfaceRun, x: int, y: int) -> Barycentric:
     """Barycentrics of the surface point at the pixel's centre."""
     return barycentric_at(run.frame, surface_point(view, run.plane, x, y))
 
 
-@kernel
+@inlined
 def mix(array: F64Array | F32Array, i0: int, i1: int, i2: int, b: Barycentric) -> Vec3:
     """Weighted sum of three rows; equal rows are returned unchanged."""
     if rows_equal(array, i0, i1, i2):
@@ -102,7 +109,7 @@ def mix(array: F64Array | F32Array, i0: int, i1: int, i2: int, b: Barycentric) -
     )
 
 
-@kernel
+@inlined
 def shading_normal_ws(
     geometry: Geometry, run: SurfaceRun, t: int, b: Barycentric
 ) -> tuple[bool, Vec3]:
@@ -114,13 +121,13 @@ def shading_normal_ws(
     if not (np.isfinite(squared) and squared > 0.0):
         return False, Vec3(0.0, 0.0, 0.0)
     if run.normal_varies:
-        n = normalize(n)
+        n = scale(n, 1.0 / np.sqrt(squared))
     if run.back_side:
         n = Vec3(-n.x, -n.y, -n.z)
     return True, n
 
 
-@kernel
+@inlined
 def base_color(geometry: Geometry, t: int, b: Barycentric) -> Vec3:
     """Material base colour times the vertex colour."""
     m = geometry.triangle_material[t]
@@ -131,7 +138,7 @@ def base_color(geometry: Geometry, t: int, b: Barycentric) -> Vec3:
     return Vec3(color.x * v.x, color.y * v.y, color.z * v.z)
 
 
-@kernel
+@inlined
 def normal_reflectivity(
     geometry: Geometry, t: int, albedo: Vec3, fresnel: bool, max_roughness: float
 ) -> Vec3:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import kernel
+from .._jit import inlined, kernel
 
 SUBPIXELS = 256
 HALF = 128
@@ -33,22 +33,20 @@ class Edges(NamedTuple):
     e2: int
 
 
-@kernel
+@inlined
 def doubled_area(x0: int, y0: int, x1: int, y1: int, x2: int, y2: int) -> int:
     """Twice the signed area in (1/256 px)²; negative is counter-clockwise on screen (y down)."""
     return (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
 
 
-@kernel
+@inlined
 def edge_at_origin(a: int, b: int, x: int, y: int) -> int:
     """E at the centre of pixel (0, 0) over 256, with the fill rule's −1."""
-    e = a * (HALF - x) + b * (HALF - y)
-    if not (a > 0 or (a == 0 and b > 0)):
-        e -= 1
-    return e >> 8
+    top_left = (a > 0) | ((a == 0) & (b > 0))  # no branch: it could not be predicted
+    return (a * (HALF - x) + b * (HALF - y) + top_left - 1) >> 8
 
 
-@kernel
+@inlined
 def make_edges(x0: int, y0: int, x1: int, y1: int, x2: int, y2: int) -> Edges:
     """Edge functions of a triangle with positive doubled area."""
     a0, b0 = y0 - y1, x1 - x0

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import kernel
-from ..camera import ViewParams, point_at
+from .._jit import inlined, kernel
+from ..camera import ViewParams
 from ..typed import F64Array, I32Array
 from ..vecmath.vec import Vec3, cross, dot, sub
 
@@ -22,7 +22,7 @@ class NearnessPlane(NamedTuple):
     c: float
 
 
-@kernel
+@inlined
 def load(points: F64Array, i: int) -> Vec3:
     """Row i of an (n, 3) array."""
     return Vec3(points[i, 0], points[i, 1], points[i, 2])
@@ -40,31 +40,32 @@ def depth_of_nearness(view: ViewParams, k: float) -> float:
     return 1.0 / k if view.perspective else -k
 
 
-@kernel
+@inlined
 def plane_normal(v0: Vec3, v1: Vec3, v2: Vec3) -> Vec3:
     """Normal of the counter-clockwise triangle, length twice its area."""
     return cross(sub(v1, v0), sub(v2, v0))
 
 
-@kernel
+@inlined
 def nearest_vertex(view: ViewParams, v0: Vec3, v1: Vec3, v2: Vec3) -> Vec3:
     """The vertex nearest the eye (orthographic: of least depth); ties to the first."""
     if view.perspective:
         d0, d1, d2 = dot(v0, v0), dot(v1, v1), dot(v2, v2)
     else:
         d0, d1, d2 = -v0.z, -v1.z, -v2.z
-    if d1 < d0:
-        return v2 if d2 < d1 else v1
-    return v2 if d2 < d0 else v0
+    d01, x, y, z = (d1, v1.x, v1.y, v1.z) if d1 < d0 else (d0, v0.x, v0.y, v0.z)
+    third = d2 < d01
+    return Vec3(v2.x if third else x, v2.y if third else y, v2.z if third else z)
 
 
-@kernel
-def nearness_plane(view: ViewParams, v0: Vec3, v1: Vec3, v2: Vec3) -> NearnessPlane:
+@inlined
+def nearness_plane(view: ViewParams, n: Vec3, v0: Vec3, v1: Vec3, v2: Vec3) -> NearnessPlane:
     """k = (n·d)/(n·v_a) as an affine function of the pixel (orthographic: −depth).
+
+    n: `plane_normal` of the triangle.
 
     A triangle seen exactly edge-on has no such function: it gets its nearest vertex's k.
     """
-    n = plane_normal(v0, v1, v2)
     va = nearest_vertex(view, v0, v1, v2)
     x0 = (0.5 - view.cx) * view.inverse_fx
     y0 = (view.cy - 0.5) * view.inverse_fy
@@ -101,28 +102,23 @@ class Barycentric(NamedTuple):
 
 
 class BarycentricFrame(NamedTuple):
-    """Dual vectors: weight i of point p is dual_i·(p − v0), i = 1, 2."""
+    """Dual vectors: weight i of point p is scale · dual_i·(p − v0), i = 1, 2."""
 
     v0: Vec3
     dual1: Vec3
     dual2: Vec3
+    scale: float
 
 
-@kernel
-def barycentric_frame(v0: Vec3, v1: Vec3, v2: Vec3) -> BarycentricFrame:
-    """Set-up of `barycentric_at`; a triangle without area gives zero duals (vertex 0 alone)."""
-    n = plane_normal(v0, v1, v2)
+@inlined
+def barycentric_frame(n: Vec3, v0: Vec3, v1: Vec3, v2: Vec3) -> BarycentricFrame:
+    """Set-up of `barycentric_at`, n = `plane_normal`; without area vertex 0 has all the weight."""
     nn = dot(n, n)
-    if not nn > 0.0:
-        return BarycentricFrame(v0, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
-    d1 = cross(sub(v2, v0), n)
-    d2 = cross(n, sub(v1, v0))
-    return BarycentricFrame(
-        v0, Vec3(d1.x / nn, d1.y / nn, d1.z / nn), Vec3(d2.x / nn, d2.y / nn, d2.z / nn)
-    )
+    scale = 1.0 / nn if nn > 0.0 else 0.0
+    return BarycentricFrame(v0, cross(sub(v2, v0), n), cross(n, sub(v1, v0)), scale)
 
 
-@kernel
+@inlined
 def barycentric_at(frame: BarycentricFrame, p: Vec3) -> Barycentric:
     """Weights of a point on the plane: perspective-correct, since p is the point in space.
 
@@ -130,8 +126,8 @@ def barycentric_at(frame: BarycentricFrame, p: Vec3) -> Barycentric:
     and divided by their sum.
     """
     r = sub(p, frame.v0)
-    b1 = dot(frame.dual1, r)
-    b2 = dot(frame.dual2, r)
+    b1 = dot(frame.dual1, r) * frame.scale
+    b2 = dot(frame.dual2, r) * frame.scale
     if not b1 > 0.0:
         b1 = 0.0
     if not b2 > 0.0:
@@ -139,17 +135,21 @@ def barycentric_at(frame: BarycentricFrame, p: Vec3) -> Barycentric:
     b0 = 1.0 - b1 - b2
     if not b0 > 0.0:
         b0 = 0.0
-    total = b0 + b1 + b2
-    if not np.isfinite(total):
+    share = 1.0 / (b0 + b1 + b2)
+    if not share > 0.0:  # NaN, or an infinite sum
         return Barycentric(1.0, 0.0, 0.0)
-    return Barycentric(b0 / total, b1 / total, b2 / total)
+    return Barycentric(b0 * share, b1 * share, b2 * share)
 
 
-@kernel
+@inlined
 def surface_point(view: ViewParams, plane: NearnessPlane, x: int, y: int) -> Vec3:
     """View-space point of the plane at the centre of pixel (x, y)."""
     depth = depth_of_nearness(view, nearness_at(plane, x, y))
-    return point_at(view, x + 0.5, y + 0.5, depth)
+    px = (x + 0.5 - view.cx) * view.inverse_fx
+    py = (view.cy - (y + 0.5)) * view.inverse_fy
+    if view.perspective:
+        return Vec3(px * depth, py * depth, -depth)
+    return Vec3(px, py, -depth)
 
 
 @kernel

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from .._jit import driver, kernel
+from .._jit import driver, inlined, kernel
 from ..camera import ViewParams, clip_xyw, to_view
 from ..typed import F64Array, FloatArray, I32Array, I64Array, U8Array
 from . import clip, coverage, surface
@@ -188,6 +188,19 @@ def assemble(
                 continue
             if xa > xb or ya > yb:
                 continue
+            if xb - xa <= 1 and yb - ya <= 1:
+                # Most of these small ones cover no centre; to know it now saves the record.
+                if area > 0:
+                    edges = coverage.make_edges(x0, y0, x1, y1, x2, y2)
+                else:
+                    edges = coverage.make_edges(x0, y0, x2, y2, x1, y1)
+                if not (
+                    coverage.covers(edges, xa, ya)
+                    or coverage.covers(edges, xb, ya)
+                    or coverage.covers(edges, xa, yb)
+                    or coverage.covers(edges, xb, yb)
+                ):
+                    continue
             is_front = area < 0 or flags[t] & DOUBLE_SIDED
             if not is_front and not want_back:
                 culled = True
@@ -282,7 +295,7 @@ def bin_records(records: I32Array, bands: int) -> tuple[I64Array, I32Array]:
     return start, order
 
 
-@kernel
+@inlined
 def oriented_edges(
     draw_id: int, nt: int, snapped: I32Array, faces: I32Array, piece_snapped: I32Array
 ) -> coverage.Edges:
@@ -303,17 +316,15 @@ def oriented_edges(
     return coverage.make_edges(x0, y0, x1, y1, x2, y2)
 
 
-@kernel
+@inlined
 def triangle_plane(
     view: ViewParams, positions_vs: F64Array, faces: I32Array, t: int
 ) -> surface.NearnessPlane:
     """Nearness plane of the unclipped triangle t."""
-    return surface.nearness_plane(
-        view,
-        surface.load(positions_vs, faces[t, 0]),
-        surface.load(positions_vs, faces[t, 1]),
-        surface.load(positions_vs, faces[t, 2]),
-    )
+    v0 = surface.load(positions_vs, faces[t, 0])
+    v1 = surface.load(positions_vs, faces[t, 1])
+    v2 = surface.load(positions_vs, faces[t, 2])
+    return surface.nearness_plane(view, surface.plane_normal(v0, v1, v2), v0, v1, v2)
 
 
 @kernel
@@ -411,6 +422,7 @@ def draw_back(
         mine = ANY_OBJECT if any_object else triangle_object[t]
         y_first, y_last = max(row0, rows & 0xFFFF), min(last, rows >> 16)
         if x_last - x_first < SPAN_COLUMNS:
+            # Step the edge functions; a record that covers no centre needs no plane.
             c0 = edges.e0 + edges.a0 * x_first + edges.b0 * y_first
             c1 = edges.e1 + edges.a1 * x_first + edges.b1 * y_first
             c2 = edges.e2 + edges.a2 * x_first + edges.b2 * y_first
