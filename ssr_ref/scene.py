@@ -245,6 +245,7 @@ class Scene:
         for node in self.nodes:
             for primitive in self.meshes[node.mesh].primitives:
                 used = primitive.positions[np.unique(primitive.faces)]
+                used.setflags(write=False)  # as primitive.positions are: one compiled signature
                 points = np.empty((len(used), 3))
                 transforms.transform_points(node.world_from_mesh, used, points)
                 points = points[np.isfinite(points).all(axis=1)]

@@ -11,6 +11,14 @@ import numpy as np
 from .._jit import inlined, kernel
 from ..camera import ViewParams
 from ..typed import F64Array, I32Array
+from ..vecmath.exact import (
+    add_pairs,
+    cross_pairs,
+    difference_of_points,
+    dot_pairs,
+    scale_pair,
+    subtract_pairs,
+)
 from ..vecmath.vec import Vec3, cross, dot, sub
 
 
@@ -69,6 +77,8 @@ def nearness_plane(view: ViewParams, n: Vec3, v0: Vec3, v1: Vec3, v2: Vec3) -> N
     va = nearest_vertex(view, v0, v1, v2)
     x0 = (0.5 - view.cx) * view.inverse_fx
     y0 = (view.cy - 0.5) * view.inverse_fy
+    if not plane_is_well_conditioned(view, n, va, v0, v1, v2, x0, y0):
+        return careful_nearness_plane(view, va, v0, v1, v2, x0, y0)
     if view.perspective:
         scale = 1.0 / dot(n, va)
         a = n.x * view.inverse_fx * scale
@@ -79,6 +89,60 @@ def nearness_plane(view: ViewParams, n: Vec3, v0: Vec3, v1: Vec3, v2: Vec3) -> N
         a = -(n.x * view.inverse_fx * scale)
         b = n.y * view.inverse_fy * scale
         c = va.z - (n.x * (x0 - va.x) + n.y * (y0 - va.y)) * scale
+    return NearnessPlane(a, b, c)
+
+
+WELL_CONDITIONED = 4.0
+"""Greatest ratio of the terms' magnitudes to their sum: the relative error of k then stays below
+32 · 2⁻⁵³ · (|c| + |b|·H + |a|·W)/k (three roundings of each of two products, twice)."""
+
+
+@inlined
+def plane_is_well_conditioned(
+    view: ViewParams, n: Vec3, va: Vec3, v0: Vec3, v1: Vec3, v2: Vec3, x0: float, y0: float
+) -> bool:
+    """Whether neither the normal nor its product with va has lost digits to cancellation."""
+    ax, ay, az = abs(v1.x - v0.x), abs(v1.y - v0.y), abs(v1.z - v0.z)
+    bx, by, bz = abs(v2.x - v0.x), abs(v2.y - v0.y), abs(v2.z - v0.z)
+    tx, ty, tz = ay * bz + az * by, az * bx + ax * bz, ax * by + ay * bx
+    across_x, across_y = view.width * view.inverse_fx, view.height * view.inverse_fy
+    span = abs(n.x) * across_x + abs(n.y) * across_y
+    if view.perspective:
+        product = abs(dot(n, va))
+        terms = tx * abs(va.x) + ty * abs(va.y) + tz * abs(va.z)
+        numerator = tx * (abs(x0) + across_x) + ty * (abs(y0) + across_y) + tz
+        return (
+            numerator <= WELL_CONDITIONED * (abs(n.x * x0 + n.y * y0 - n.z) + span)
+            and terms <= WELL_CONDITIONED * product
+            and product > 0.0
+        )
+    depth = abs(n.z * va.z - n.x * (x0 - va.x) - n.y * (y0 - va.y))
+    terms = (abs(n.x) + tx) * abs(x0 - va.x) + (abs(n.y) + ty) * abs(y0 - va.y)
+    return (
+        terms + abs(n.z * va.z) + tx * across_x + ty * across_y <= WELL_CONDITIONED * (depth + span)
+        and tz <= WELL_CONDITIONED * abs(n.z)
+        and tz > 0.0
+    )
+
+
+@kernel
+def careful_nearness_plane(
+    view: ViewParams, va: Vec3, v0: Vec3, v1: Vec3, v2: Vec3, x0: float, y0: float
+) -> NearnessPlane:
+    """The same function by pairs of twice the precision: slivers, and planes far from a vertex."""
+    n = cross_pairs(difference_of_points(v1, v0), difference_of_points(v2, v0))
+    product = dot_pairs(n, va)
+    if view.perspective:
+        scale = 1.0 / product.hi
+        a = n.x.hi * view.inverse_fx * scale
+        b = -(n.y.hi * view.inverse_fy * scale)
+        c = (n.x.hi * x0 + n.y.hi * y0 - n.z.hi) * scale
+    else:
+        scale = 1.0 / n.z.hi
+        a = -(n.x.hi * view.inverse_fx * scale)
+        b = n.y.hi * view.inverse_fy * scale
+        at_origin = add_pairs(scale_pair(n.x, x0), scale_pair(n.y, y0))
+        c = subtract_pairs(product, at_origin).hi * scale
     if np.isfinite(a) and np.isfinite(b) and np.isfinite(c):
         return NearnessPlane(a, b, c)
     depth = min(-v0.z, -v1.z, -v2.z)

@@ -482,6 +482,7 @@ def settle_front(
     projected: Projected,
     geometry: Geometry,
     pieces: Pieces,
+    farthest: float,
     row0: int,
     nearness: F64Array,
     ids: I32Array,
@@ -505,6 +506,7 @@ def settle_front(
             end = surface.run_end(ids, row, x)
             t = np.int64(parent[draw_id - nt]) if draw_id >= nt else draw_id
             mine = np.int32(-1)
+            low = np.inf
             if draw_id >= 0:
                 # Count first, in a loop without branches; few runs have anything to clamp.
                 low, high = polygon_range(view, projected, faces, pieces, draw_id)
@@ -523,6 +525,12 @@ def settle_front(
             if want_back:
                 for j in range(np.uint64(x), np.uint64(end)):
                     owner[row, j] = mine
+            if draw_id >= 0 and low <= farthest:  # part of the polygon lies beyond far
+                for j in range(x, end):
+                    if nearness[row, j] <= farthest:
+                        ids[row, j] = -1
+                        if want_back:
+                            owner[row, j] = -1
             x = end
         for j in range(width):
             triangle_id[y, j] = ids[row, j]
@@ -548,7 +556,7 @@ def draw_bands(
     back_depth: FloatArray,
     clamped: I64Array,
 ) -> None:
-    """Draw every band. farthest: the k that a front face must exceed (0 or −inf: no far plane).
+    """Draw every band. farthest: the k that a front face must exceed, after it was clamped.
 
     back_depth is left alone unless want_back; clamped (bands,) counts pixels.
     """
@@ -556,7 +564,7 @@ def draw_bands(
     for band in prange(bands):
         row0 = band * BAND_ROWS
         rows = min(BAND_ROWS, view.height - row0)
-        nearness = np.full((rows, view.width), farthest)
+        nearness = np.full((rows, view.width), -np.inf)
         ids = np.full((rows, view.width), -1, np.int32)
         owner = np.empty((rows, view.width if want_back else 0), np.int32)
         draw_front(view, projected, geometry.faces, pieces, front, band, row0, nearness, ids)
@@ -565,6 +573,7 @@ def draw_bands(
             projected,
             geometry,
             pieces,
+            farthest,
             row0,
             nearness,
             ids,
