@@ -114,7 +114,7 @@ def _write_files(frame: Frame, folder: Path, *, previews: bool, progress: Progre
         (SETTINGS_FILE, _write_json, frame.settings.to_json()),
         (SCENE_FILE, _write_scene, frame.scene),
         (NPZ_FILE, write_npz, arrays),
-        (EXR_FILE, write_exr, contents.exr_channels(arrays)),
+        (EXR_FILE, _write_exr, arrays),
     ]
     if previews:
         stages.append((PREVIEWS, _write_previews, frame))
@@ -140,6 +140,10 @@ def _write(name: str, write: Callable[[Path, Any], object], folder: Path, data: 
 
 def _write_json(path: Path, data: Any) -> None:
     path.write_bytes(contents.json_bytes(data))
+
+
+def _write_exr(path: Path, arrays: dict[str, Any]) -> None:
+    write_exr(path, contents.exr_channels(arrays))  # the planes live no longer than this
 
 
 def _write_scene(path: Path, scene: Scene) -> None:

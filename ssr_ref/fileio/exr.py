@@ -1,13 +1,12 @@
 """Multi-channel OpenEXR files: one part, scanlines, ZIP, float32 and uint32, nothing lost.
 
-The file is encoded in memory and written by Python: OpenEXR's own writer does not notice a full
-disk when the image is small. The header holds no time and no host, and channels are sorted by
+OpenEXR writes through a Python file: its own writer does not notice a full disk when the image is
+small. The header holds no time and no host, and channels are sorted by
 name, so the same arrays give the same bytes with the same OpenEXR version.
 """
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -27,12 +26,6 @@ def write_exr(path: Path, channels: Mapping[str, AnyArray]) -> None:
 
     Raises FileError for a channel of another dtype or shape, OSError if the disk refuses.
     """
-    encoded = encode_exr(channels)
-    path.write_bytes(encoded)
-
-
-def encode_exr(channels: Mapping[str, AnyArray]) -> memoryview:
-    """The bytes of the file that `write_exr` writes."""
     import OpenEXR
 
     shapes = {array.shape for array in channels.values()}
@@ -44,15 +37,14 @@ def encode_exr(channels: Mapping[str, AnyArray]) -> memoryview:
     # OpenEXR puts its own objects into the dictionary that it is given: hand it a new one.
     pixels = {name: np.ascontiguousarray(channels[name]) for name in sorted(channels)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    stream = io.BytesIO()
     try:
-        OpenEXR.File(header, pixels).write(stream)
+        with path.open("wb") as file:
+            OpenEXR.File(header, pixels).write(file)
     except TypeError:
         raise FileError(
-            f"OpenEXR {OpenEXR.__version__} cannot write to memory; expected 3.5 or newer: "
+            f"OpenEXR {OpenEXR.__version__} cannot write to an open file; expected 3.5 or newer: "
             "pip install --upgrade OpenEXR"
         ) from None
-    return stream.getbuffer()
 
 
 def read_exr(path: str | Path) -> dict[str, AnyArray]:

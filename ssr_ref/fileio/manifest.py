@@ -89,32 +89,37 @@ def stored_arrays(frame: Frame) -> dict[str, AnyArray]:
                 raise BundleError(f"two buffers are named {name}; expected names of their own")
             found[name] = _stored(array, floats)
     if floats is np.float32:
-        texel = np.floor(frame.hits.hit_px)
-        ones = np.ones(2, np.float32)
-        found["hit_px"] = _within_texel(found["hit_px"], ones, texel)
-        found["hit_uv"] = _within_texel(
-            found["hit_uv"], np.array([width, height], np.float32), texel
-        )
+        _keep_in_texel(found["hit_px"], frame.hits.hit_px, (1, 1))
+        _keep_in_texel(found["hit_uv"], frame.hits.hit_px, (width, height))
     return dict(sorted(found.items()))
 
 
-def _within_texel(stored: AnyArray, scale: AnyArray, texel: AnyArray) -> AnyArray:
-    """`stored` moved by the few float32 steps after which floor(stored · scale) is `texel`.
+def _keep_in_texel(stored: AnyArray, hit_px: AnyArray, scale: tuple[int, int]) -> None:
+    """Move float32 positions, in place, until floor(stored · scale) is the texel of hit_px.
 
     A hit an ulp before a pixel's border rounds onto the border, and who takes the texel from the
-    file would read the neighbour. Both float32 and float64 products are made to agree.
+    file would read the neighbour. Both float32 and float64 products are made to agree; it takes a
+    few float32 steps.
     """
-    out = stored.copy()
-    for _ in range(8):
-        least = np.minimum(np.floor(out * scale), np.floor(out.astype(np.float64) * scale))
-        most = np.maximum(np.floor(out * scale), np.floor(out.astype(np.float64) * scale))
-        out = np.where(most > texel, np.nextafter(out, np.float32(-np.inf)), out)
-        out = np.where(least < texel, np.nextafter(out, np.float32(np.inf)), out)
-    return out
+    for axis in range(2):
+        plane = stored[..., axis]
+        texel = np.floor(hit_px[..., axis])
+        at = np.nonzero(np.isfinite(texel))
+        value, want = plane[at], texel[at]
+        for _ in range(8):
+            single = np.floor(value * np.float32(scale[axis]))
+            double = np.floor(value.astype(np.float64) * scale[axis])
+            high = np.maximum(single, double) > want
+            low = np.minimum(single, double) < want
+            if not (high.any() or low.any()):
+                break
+            value = np.where(high, np.nextafter(value, np.float32(-np.inf)), value)
+            value = np.where(low, np.nextafter(value, np.float32(np.inf)), value)
+        plane[at] = value
 
 
 def _stored(array: AnyArray, floats: Any) -> AnyArray:
-    if array.dtype.kind != "f":
+    if array.dtype.kind != "f" or (array.dtype == floats and not np.isnan(array).any()):
         return np.ascontiguousarray(array)
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         out = np.array(array, floats, order="C")
@@ -129,7 +134,7 @@ def exr_channels(arrays: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
         for component, channel in enumerate(channel_names(name)):
             plane = array if array.ndim == 2 else array[..., component]
             if name in ID_ARRAYS:
-                plane = (plane.astype(np.int64) + 1).astype(np.uint32)
+                plane = (plane + np.int32(1)).astype(np.uint32)
             elif plane.dtype.kind == "f":
                 plane = _stored(plane, np.float32)
             else:
