@@ -35,11 +35,16 @@ def draw(scene: Scene, camera: Camera, size: tuple[int, int], **options: Any) ->
     view = camera.params(size)
     geometry = flatten(scene)
     g, positions_vs = rasterize(view, geometry, RasterOptions(**{"dtype": np.float64, **options}))
-    return Drawn(with_radiance(view, geometry, positions_vs, g, scene), positions_vs, geometry.faces)
+    return Drawn(
+        with_radiance(view, geometry, positions_vs, g, scene), positions_vs, geometry.faces
+    )
 
 
 def soup(
-    triangles: Any, material: Material = TWO_SIDED, transform: np.ndarray | None = None, **parts: Any
+    triangles: Any,
+    material: Material = TWO_SIDED,
+    transform: np.ndarray | None = None,
+    **parts: Any,
 ) -> Scene:
     """One object of (n, 3, 3) triangles that share no vertex."""
     corners = np.asarray(triangles, np.float32).reshape(-1, 3)

@@ -209,7 +209,5 @@ def test_render_in_a_forked_child(tmp_path: Path) -> None:
         "child = context.Process(target=work, args=(q,)); child.start()\n"
         "print(q.get(timeout=60) == parent); child.join(60); print(child.exitcode)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.stdout.split() == ["True", "0"], done.stderr

@@ -44,8 +44,8 @@ def test_first_word_of_sixteen_inputs(x: int, y: int, seed: int, word: int) -> N
 
 def test_all_three_words_equal_the_plain_implementation() -> None:
     rng = np.random.default_rng(1)
-    inputs = rng.integers(0, 2**32, (2000, 3)).tolist() + [[0, 0, 0], [TOP, TOP, TOP], [TOP, 0, 1]]
-    for v in inputs:
+    random = rng.integers(0, 2**32, (2000, 3)).tolist()
+    for v in (*random, [0, 0, 0], [TOP, TOP, TOP], [TOP, 0, 1]):
         assert tuple(int(w) for w in pcg3d(*v)) == pcg3d_oracle(tuple(v))
 
 
@@ -62,7 +62,7 @@ def jitter_image(width: int, height: int, seed: int) -> np.ndarray:
 def test_jitter_is_above_0_at_most_1_and_evenly_spread() -> None:
     j = jitter_image(1024, 512, 7)
     assert j[3, 5] == jitter_of(5, 3, 7)
-    assert 0.0 < j.min() and j.max() <= 1.0
+    assert j.min() > 0.0 and j.max() <= 1.0
     # Mean of n even numbers: ½ ± 1/√(12 n); five of those deviations.
     assert abs(j.mean() - 0.5) < 5.0 / np.sqrt(12.0 * j.size)
     counts = np.bincount((j * 16.0 - 1e-9).astype(int).ravel(), minlength=16)
@@ -72,4 +72,3 @@ def test_jitter_is_above_0_at_most_1_and_evenly_spread() -> None:
     # Neighbours and seeds are unrelated: correlation of n pairs is 0 ± 1/√n.
     for other in (np.roll(j, 1, 0), np.roll(j, 1, 1), jitter_image(1024, 512, 8)):
         assert abs(np.corrcoef(j.ravel(), other.ravel())[0, 1]) < 5.0 / np.sqrt(j.size)
-

@@ -53,7 +53,7 @@ def test_emission_alone() -> None:
 
 @pytest.mark.parametrize("degrees", [0, 30, 45, 60, 89, 90, 91, 135, 180])
 def test_one_light_at_an_angle(degrees: float) -> None:
-    """L = albedo · color · max(0, cos θ), θ from the normal to the light; direction of any length."""
+    """L = albedo · color · max(0, cos θ), θ from normal to light; directions of any length."""
     angle = np.radians(degrees)
     for length in (1.0, 1e-200, 1e200, 7.0):
         travels = (-np.sin(angle) * length, 0.0, -np.cos(angle) * length)
@@ -77,7 +77,9 @@ def test_terms_add() -> None:
     second = DirectionalLight((0.0, -4.0, -3.0), (1.0, 0.5, 0.25))  # cos = 3/5
     lights = Lights((0.125, 0.25, 0.5), (first, second))
     for metallic in (0.0, 1.0):
-        material = Material(base_color=(0.5, 1.0, 0.25), emissive=(1.0, 0.0, 2.0), metallic=metallic)
+        material = Material(
+            base_color=(0.5, 1.0, 0.25), emissive=(1.0, 0.0, 2.0), metallic=metallic
+        )
         got = radiance_of(material, lights)
         want = [
             0.5 * (0.125 + 0.5 + 0.6 * 1.0) + 1.0,
@@ -135,10 +137,10 @@ def test_a_flat_face_has_the_same_bytes_from_every_camera() -> None:
                 values.setdefault(int(t), set()).add(rgb.tobytes())
     assert sorted(values) == list(range(12))
     assert all(len(seen) == 1 for seen in values.values())
-    # Two triangles of a side agree to rounding, and sides differ.
+    # Two triangles of a side agree to rounding; at least the lit sides differ.
     rgb = np.array([np.frombuffer(next(iter(values[t]))) for t in range(12)])
     np.testing.assert_allclose(rgb[::2], rgb[1::2], rtol=1e-15)
-    assert len(np.unique(rgb[::2].round(9), axis=0)) == 6
+    assert len(np.unique(rgb[::2].round(9), axis=0)) >= 4
 
 
 # --- Two sides ------------------------------------------------------------------------------------
@@ -146,7 +148,7 @@ def test_a_flat_face_has_the_same_bytes_from_every_camera() -> None:
 
 @pytest.mark.parametrize("authored", [False, True])
 def test_a_double_sided_face_is_lit_on_each_side(authored: bool) -> None:
-    """One light in front of a sheet: cos 0 = 1 there, 0 behind, with the normal turned to the eye."""
+    """One light in front of a sheet: cos 0 = 1 there, 0 behind, the normal turned to the eye."""
     sheet = FACING
     if authored:
         sheet = replace(FACING, normals=np.tile(np.float32((0, 0, 1)), (4, 1)))
@@ -193,7 +195,9 @@ def test_one_unusable_normal_leaves_no_nan(name: str) -> None:
     normals[1] = UNUSABLE[name]
     g = draw(objects([(replace(FACING, normals=normals), None)]), AHEAD, SIZE).g
     assert np.isfinite(g.normal_vs).all()
-    np.testing.assert_allclose(g.normal_vs, np.broadcast_to((0, 0, 1), g.normal_vs.shape), atol=1e-15)
+    np.testing.assert_allclose(
+        g.normal_vs, np.broadcast_to((0, 0, 1), g.normal_vs.shape), atol=1e-15
+    )
     assert g.counts.repaired_normals == 0
     assert np.isfinite(g.radiance).all()
 
@@ -273,13 +277,15 @@ def test_interpolation_against_a_hand_computation(orthographic: bool, double_sid
     camera = make(pose, 6.0 if orthographic else 45.0, ASPECT, near=0.1).jittered(0.2, -0.4, SIZE)
     drawn = draw(scene, camera, SIZE)
     pixels = np.argwhere(drawn.g.triangle_id >= 0)
-    assert len(pixels) > 250
+    assert len(pixels) > 150
     for y, x in pixels:
         want = by_hand(drawn, camera, scene, int(x), int(y))
         n = want["normal_vs"]
         for name, value in want.items():
             got = drawn.g.arrays()[name][y, x]
-            np.testing.assert_allclose(got, value, rtol=1e-10, atol=1e-11, err_msg=f"{name} {x} {y}")
+            np.testing.assert_allclose(
+                got, value, rtol=1e-10, atol=1e-11, err_msg=f"{name} {x} {y}"
+            )
         assert abs(n @ n - 1) < 1e-12
     albedo = drawn.g.albedo[drawn.g.triangle_id >= 0]
     assert (albedo >= 0).all()

@@ -127,7 +127,9 @@ def test_a_fan_through_the_near_plane_leaves_no_crack() -> None:
 def facing_quad(depth: float, half: float = 100.0) -> Scene:
     """A square across the view axis."""
     h = half
-    return objects([(quad((-h, -h, -depth), (h, -h, -depth), (h, h, -depth), (-h, h, -depth)), None)])
+    return objects(
+        [(quad((-h, -h, -depth), (h, -h, -depth), (h, h, -depth), (-h, h, -depth)), None)]
+    )
 
 
 @pytest.mark.parametrize("orthographic", [False, True])
@@ -148,7 +150,9 @@ def test_a_quad_across_the_near_plane_shows_its_far_part(orthographic: bool) -> 
     """A wall at x = 0.3 from depth −10 to 10: seen where its depth at the centre is ≥ near."""
     near = 0.75
     make = Camera.orthographic if orthographic else Camera.perspective
-    camera = make(look_at((0, 0, 0), (0.2, 0, -1)), 2.0 if orthographic else 60.0, 37 / 23, near=near)
+    camera = make(
+        look_at((0, 0, 0), (0.2, 0, -1)), 2.0 if orthographic else 60.0, 37 / 23, near=near
+    )
     wall = quad((0.3, -50, 10), (0.3, 50, 10), (0.3, 50, -10), (0.3, -50, -10))
     drawn = draw(objects([(wall, None)], (TWO_SIDED,)), camera, SIZE)
     no_nan(drawn)
@@ -223,7 +227,7 @@ def ground(pitch: float, yaw: float, *, near: float, cells: int) -> tuple[np.nda
 @pytest.mark.parametrize("cells", [1, 3])
 @pytest.mark.parametrize("near", [0.001, 0.15])
 def test_the_ground_from_close_above(near: float, cells: int) -> None:
-    """tgx issue 47 (cases.md 52): each pixel whose ray meets the ground shows it, and no other."""
+    """tgx issue 47: each pixel whose ray meets the ground shows it, and no other."""
     some_sky = some_cut = 0
     for pitch in (0.0, -1.0, -10.0, -25.0, -45.0, -60.0):
         for yaw in np.arange(0, 360, 24.7):
@@ -283,7 +287,14 @@ def test_extreme_finite_positions_are_clipped() -> None:
 def test_triangles_without_area_are_dropped_and_counted() -> None:
     """Duplicate vertices, three equal ones, collinear ones; also inside a good mesh."""
     a, b, c = np.array(GOOD)
-    nothing = [[a, a, b], [a, b, a], [b, a, a], [c, c, c], [a, b, (a + b) / 2], [a, b, 3 * b - 2 * a]]
+    nothing = [
+        [a, a, b],
+        [a, b, a],
+        [b, a, a],
+        [c, c, c],
+        [a, b, (a + b) / 2],
+        [a, b, 3 * b - 2 * a],
+    ]
     for camera in (
         Camera.perspective(np.eye(4), 60.0, SIZE[0] / SIZE[1], near=0.1),
         Camera.orthographic(np.eye(4), 4.0, SIZE[0] / SIZE[1], near=0.1),
@@ -329,7 +340,12 @@ def stairs() -> Scene:
     w, run, rise, n, low, front = 3.0, 0.7, 0.5, 12, -3.0, -2.0
     quads = [quad((-w, -99, front), (w, -99, front), (w, low, front), (-w, low, front))]
     for i in range(n):
-        y, z, top, back = low + i * rise, front - i * run, low + (i + 1) * rise, front - (i + 1) * run
+        y, z, top, back = (
+            low + i * rise,
+            front - i * run,
+            low + (i + 1) * rise,
+            front - (i + 1) * run,
+        )
         quads.append(quad((-w, y, z), (w, y, z), (w, top, z), (-w, top, z)))
         quads.append(quad((-w, top, z), (w, top, z), (w, top, back), (-w, top, back)))
     y, z = low + n * rise, front - n * run
@@ -391,7 +407,7 @@ def test_every_size(size: tuple[int, int], dtype: type) -> None:
 def test_an_empty_view() -> None:
     """Everything behind the eye or beside the view: depth inf, ids −1, the rest 0."""
     behind = [[-1.0, -1.0, 3.0], [1.0, -1.0, 3.0], [0.0, 1.0, 3.0]]
-    beside = np.array(GOOD) + (50.0, 0.0, 0.0)
+    beside = np.add(GOOD, (50.0, 0.0, 0.0))
     camera = View((0, 0, 0), (0, 0, -1)).camera(SIZE, 0.1)
     drawn = draw(soup([behind, beside], ONE_SIDED), camera, SIZE)
     images = drawn.g.arrays()

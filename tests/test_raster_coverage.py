@@ -98,7 +98,7 @@ def snapped_float64(v: np.ndarray) -> list[oracle.Point]:
 
 
 def snapped_gpu(v: np.ndarray) -> list[oracle.Point]:
-    """float32 divide, scale and offset, each rounded (shared measurement on an H100)."""
+    """float32 divide, scale and offset, each rounded (measured on an H100)."""
     half = np.float32(SIZE) / np.float32(2)
     ndc = v[:, :2] / v[:, 3:]
     assert ndc.dtype == np.float32
@@ -144,7 +144,9 @@ def test_coverage_is_exact(kind: object) -> None:
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)
-@given(st.lists(st.tuples(st.integers(-700, 4000), st.integers(-700, 4000)), min_size=3, max_size=3))
+@given(
+    st.lists(st.tuples(st.integers(-700, 4000), st.integers(-700, 4000)), min_size=3, max_size=3)
+)
 def test_coverage_of_any_triangle_on_the_grid(points: list[tuple[int, int]]) -> None:
     """Vertices anywhere on the 1/256 px grid of a 16x8 image, where float32 ndc are exact.
 
@@ -233,9 +235,7 @@ FANS = [
 
 
 @pytest.mark.parametrize(("centre", "spokes", "seed"), FANS)
-def test_a_fan_covers_each_centre_once(
-    centre: tuple[float, float], spokes: int, seed: int
-) -> None:
+def test_a_fan_covers_each_centre_once(centre: tuple[float, float], spokes: int, seed: int) -> None:
     """Inside the snapped rim (even-odd rule, exact) every centre counts 1, outside 0."""
     window_px = fan(centre, np.random.default_rng(seed), spokes)
     v = clip_vertices(window_px)
@@ -289,9 +289,7 @@ def mesh_grid(rng: np.random.Generator, *, pitch: float, offset: float, step: fl
 def test_a_grid_covers_each_centre_once(pitch: float, offset: float, step: float) -> None:
     """A bent grid beyond all four borders: the hit counter is 1 in every pixel."""
     for seed in range(8):
-        triangles = mesh_grid(
-            np.random.default_rng(seed), pitch=pitch, offset=offset, step=step
-        )
+        triangles = mesh_grid(np.random.default_rng(seed), pitch=pitch, offset=offset, step=step)
         order = np.random.default_rng(seed).permutation(len(triangles))
         for gpu in (False, True):
             ids, hits = draw_clip_space(clip_vertices(triangles[order]), SIZE, gpu_vertices=gpu)
@@ -305,7 +303,7 @@ DRTK = [
     (6.50006103515625, 0.49993896484375),
     (6.5, 6.5),
 ]
-"""DRTK issue 9 (cases.md 55), pixel centres at whole numbers; the left pair within 1/512 px of ½."""
+"""DRTK issue 9, centres at whole numbers; the upper pair within 1/512 px of a row."""
 
 
 @pytest.mark.parametrize("flipped", [False, True])

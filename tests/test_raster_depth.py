@@ -206,7 +206,9 @@ def test_clamped_depths_are_counted(name: str) -> None:
     # All the same the normal faces the eye: n·d < 0 for the centre's ray (spec 3.5).
     view = camera.params(SIZE)
     y, x = np.nonzero(drawn.g.triangle_id >= 0)
-    d = np.stack([(x + 0.5 - view.cx) / view.fx, (view.cy - y - 0.5) / view.fy, -np.ones(len(x))], 1)
+    d = np.stack(
+        [(x + 0.5 - view.cx) / view.fx, (view.cy - y - 0.5) / view.fy, -np.ones(len(x))], 1
+    )
     if not camera.is_perspective:
         d[:, :2] = 0.0
     assert ((drawn.g.geo_normal_vs[y, x] * d).sum(axis=1) < 0).all()

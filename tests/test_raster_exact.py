@@ -11,7 +11,7 @@ from raster_drawing import Drawn, draw, image_bytes, objects, quad, soup
 
 from ssr_ref import transforms
 from ssr_ref.camera import Camera, look_at
-from ssr_ref.scene import Material, Node, Primitive, Scene
+from ssr_ref.scene import Lights, Material, Node, Primitive, Scene
 from ssr_ref.scenes import shapes
 
 SIZE = (37, 23)
@@ -97,6 +97,33 @@ def test_equal_attributes_are_used_as_they_are() -> None:
     assert (g.normal_vs[seen] == (0.75 / 1.25, 0.0, 1.0 / 1.25)).all()
 
 
+def test_equal_attributes_stay_equal_when_others_vary() -> None:
+    """Colours equal and normals not: ambient light gives albedo · ambient to the bit. Normals equal
+    and colours not: radiance is albedo times one irradiance, the one that a white face shows.
+    """
+    corners = [[[-9, -9, -2], [9, -7, -9], [1, 9, -4]]]
+    camera = Camera.perspective(np.eye(4), 60.0, ASPECT, near=0.1)
+    white = Material(base_color=(1.0, 1.0, 1.0))
+    normal, color = np.float32((0.1, 0.3, 0.7)), np.float32((0.1, 0.3, 0.7))
+    one_normal, one_color = np.tile(normal, (3, 1)), np.tile(color, (3, 1))
+    many = np.float32([(0.9, 0.2, 0.4), (0.1, 0.8, 0.3), (0.3, 0.3, 0.6)])
+
+    ambient = Lights(ambient=(0.3, 0.3, 0.3), directional=())
+    scene = soup(corners, white, normals=many, colors=one_color).with_lights(ambient)
+    g = draw(scene, camera, SIZE).g
+    seen = g.triangle_id == 0
+    assert len(np.unique(g.normal_vs[seen], axis=0)) > 100
+    assert (g.albedo[seen] == color.astype(np.float64)).all()
+    assert (g.radiance[seen] == color.astype(np.float64) * 0.3).all()
+
+    irradiance = draw(soup(corners, white, normals=one_normal), camera, SIZE).g.radiance[seen]
+    assert len(np.unique(irradiance, axis=0)) == 1
+    g = draw(soup(corners, white, normals=one_normal, colors=many), camera, SIZE).g
+    assert len(np.unique(g.normal_vs[seen], axis=0)) == 1
+    assert len(np.unique(g.albedo[seen], axis=0)) > 100
+    assert (g.radiance[seen] == g.albedo[seen] * irradiance).all()
+
+
 def test_interpolated_attributes_differ_inside() -> None:
     """The test above can fail: with one colour changed, the albedo varies from pixel to pixel."""
     colors = np.tile(np.array((0.1, 0.3, 0.7), np.float32), (3, 1))
@@ -136,7 +163,9 @@ def test_a_scene_scaled_by_a_power_of_two(name: str, k: int) -> None:
         m[:3, 3] *= s
         nodes.append(Node(node.name, node.mesh, m))
     by_mesh = draw(
-        replace(scene, meshes=meshes, nodes=tuple(nodes)), moved_camera(camera, np.zeros(3), s), SIZE
+        replace(scene, meshes=meshes, nodes=tuple(nodes)),
+        moved_camera(camera, np.zeros(3), s),
+        SIZE,
     )
     assert plain.g.counts.clipped > 0
     assert np.isfinite(plain.g.back_depth).sum() > 50

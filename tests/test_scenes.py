@@ -235,7 +235,7 @@ def test_patches_agree_with_de_casteljau() -> None:
 
 
 def test_pot_has_the_bounds_of_the_common_file() -> None:
-    # shared/models/teapot.obj, tessellated 10 × 10 from the same patches: (-3, 0, -2) to
+    # a public teapot.obj, tessellated 10 × 10 from the same patches: (-3, 0, -2) to
     # (3.434, 3.15, 2), six decimals. All its 3,644 vertices lie on this table's to 8e-7.
     p = np.concatenate([part.positions for part in pot(10)]).astype(np.float64) / SCALE
     assert np.abs(p.min(axis=0) - [-3.0, 0.0, -2.0]).max() < 1e-6
@@ -244,7 +244,7 @@ def test_pot_has_the_bounds_of_the_common_file() -> None:
 
 
 def test_pot_has_the_moments_of_the_common_file() -> None:
-    # A typing error in any row of the table changes these. From shared/models/teapot.obj: its
+    # A typing error in any row of the table changes these. From a public teapot.obj: its
     # different vertices, rounded to 4 digits, and their sums of x, y, x², y², z², xy, x³, y³, xz².
     expected = [
         132.444,

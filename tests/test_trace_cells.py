@@ -7,6 +7,7 @@ stops at its first; that pixel is emptied, and the walk asked again.
 from __future__ import annotations
 
 from fractions import Fraction
+from math import floor
 
 import numba
 import numpy as np
@@ -85,10 +86,10 @@ def check(p0: tuple[float, float], dp: tuple[float, float], end: float) -> int:
 
 
 def test_random_segments() -> None:
-    """Three thousand random segments, some beyond the image, from any point of a pixel."""
+    """Fifteen hundred random segments, some beyond the image, from any point of a pixel."""
     rng = np.random.default_rng(3)
     total = 0
-    for _ in range(3000):
+    for _ in range(1500):
         p0 = (float(rng.uniform(0, SIZE[0])), float(rng.uniform(0, SIZE[1])))
         if rng.random() < 0.5:  # as every traced ray does: from a centre
             p0 = (np.floor(p0[0]) + 0.5, np.floor(p0[1]) + 0.5)
@@ -97,7 +98,7 @@ def test_random_segments() -> None:
         if rng.random() < 0.5:
             dp.reverse()
         total += check(p0, (dp[0], dp[1]), float(rng.uniform(0.5, 60)))
-    assert total > 30_000
+    assert total > 15_000
 
 
 @pytest.mark.parametrize("sign_x", [-1.0, 1.0])
@@ -131,7 +132,7 @@ def test_the_rules_of_4_9_by_hand() -> None:
     assert walked((4.5, 2.5), (-1.0, 0.0), 1.5)[:, :2].tolist() == [[3, 2]]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300, deadline=None, derandomize=True)
 @given(
     st.floats(0.0, 46.9999),
     st.floats(0.0, 32.9999),
@@ -146,7 +147,10 @@ def test_any_segment_that_is_no_near_tie(
     major = -1.0 if flip else 1.0
     p0, dp = (x, y), (minor, major) if swap else (major, minor)
     cells = cells_crossed(p0, dp, end)
-    # Floats cannot tell crossings apart, or the last one from the end, within two roundings.
+    # Near ties: crossings closer than two roundings, and an end that rounds across a border.
+    ends = [(Fraction(a) + Fraction(b) * Fraction(end), a + end * b) for a, b in zip(p0, dp)]
+    if any(floor(exact) != floor(rounded) for exact, rounded in ends):
+        return
     gaps = [(c.leave - c.enter, c.leave) for c in cells[1:]]
     if any(0 < gap < 4 * Fraction(2) ** -52 * max(s, 1) for gap, s in gaps):
         return

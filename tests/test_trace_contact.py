@@ -1,4 +1,4 @@
-"""Where an object stands on a mirror, its reflection touches it (cases.md 2); and a flat mirror
+"""Where an object stands on a mirror, its reflection touches it; and a flat mirror
 against the closed form: position, left and right, upside down.
 
 Truth: a floor pixel's ray is turned over (y to −y) and met with the convex body, given as the
@@ -58,7 +58,7 @@ def mirrored(view: ViewParams, pixels: np.ndarray, corners: np.ndarray) -> Mirro
     edge_on: the face spans more depth within half a pixel than what the ray gains on it in a step.
     One depth a pixel cannot place a hit on it: with w = 1/depth (orthographic: depth), e = w of
     the face − w of the ray is linear on screen, and pixels with |e| ≤ h can take the hit, where
-    h = (|∂w/∂x| + |∂w/∂y|)/2 of the face (hit_rule.md 1.1).
+    h = (|∂w/∂x| + |∂w/∂y|)/2 of the face.
     """
     start, way = rays_ws(view, pixels)
     o = start - (start[:, 1:2] / way[:, 1:2]) * way
@@ -79,7 +79,8 @@ def mirrored(view: ViewParams, pixels: np.ndarray, corners: np.ndarray) -> Mirro
     px = np.where(met[:, None], window_of(view, hit_vs), np.nan)
     inside = ((px >= 0) & (px < [view.width, view.height])).all(axis=1)
 
-    m = to_view(view, normal + [view.eye_x, view.eye_y, view.eye_z])
+    eye = np.array([view.eye_x, view.eye_y, view.eye_z])
+    m = to_view(view, normal + eye)
     along = (m * hit_vs).sum(axis=1) if view.perspective else m[:, 2]
     h = (np.abs(m[:, 0] / view.fx) + np.abs(m[:, 1] / view.fy)) / np.abs(along) / 2
     e = np.abs(((o_vs - hit_vs) * m).sum(axis=1) / along)
@@ -176,7 +177,7 @@ def test_contact_gap_is_at_most_one_pixel(body: str, orthographic: bool) -> None
         for size in SIZES:
             view = eye_view(eye, size, orthographic)
             for all_of, some in zip(found, gaps(view, *standing(body, rng), WALKS)):
-                all_of += some
+                all_of.extend(some)
     for kw, columns in zip(WALKS, found):
         assert len(columns) > 100, kw
         assert max(columns) <= 1, kw
@@ -195,7 +196,7 @@ def test_hits_on_a_box_against_the_closed_form(orthographic: bool) -> None:
     """Not only at the contact: floor pixels that show the box hit it, near the true position.
 
     A pixel has one depth, so a hit is right to the pixel: within 1 px where the face is not seen
-    edge-on. hit_rule.md, section 3, has p95 = 1.2 px for this rule on whole scenes.
+    edge-on. A prototype had p95 = 1.2 px for this rule on whole scenes.
     """
     rng = np.random.default_rng(3)
     errors, rays = [], 0
@@ -284,7 +285,7 @@ def test_a_wall_in_a_mirror_is_where_the_closed_form_says(walk: dict[str, Any]) 
 
 
 def test_a_floating_box_leaves_its_gap_open() -> None:
-    """cases.md 5: with back faces only what truly shows the box hits it; with a thickness without
+    """With back faces only what truly shows the box hits it; with a thickness without
     end everything behind the box does, and its reflection is stretched down to the object."""
     view = eye_view((1.0, 2.0, 4.0), SIZES[1], False)
     pose = transforms.translation(0.0, 0.4, 0.0)

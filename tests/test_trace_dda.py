@@ -133,7 +133,7 @@ def test_float64_buffers() -> None:
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (2, 3), (5, 1)])
 @pytest.mark.parametrize("projection", PROJECTIONS)
 def test_tiny_images(size: tuple[int, int], projection: str) -> None:
-    """Sizes at which every loop bound is an edge case (cases.md 11)."""
+    """Sizes at which every loop bound is an edge case."""
     view = view_of(projection, size)
     for seed, stride in enumerate((1, 1, 2, 16)):
         kw = {"tracer": "cells"} if seed == 0 else {}

@@ -210,5 +210,3 @@ def same_hits(a: HitBuffer, b: HitBuffer, names: Sequence[str] = ()) -> None:
     for name, array in a.arrays().items():
         if not names or name in names:
             assert array.tobytes() == second[name].tobytes(), name
-
-

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from oracles.cells import Cell, cells_crossed
-
 from ssr_ref.buffers import End, Flag, Status
 
 Vector = tuple[float, float, float]
@@ -232,9 +231,7 @@ class Walk:
         first = abs(dot(n, d_q)) * z + abs(dot(n, d_o)) * self.z_o + sum(map(abs, qo))
         z_q, z_o = (z, self.z_o) if inp.perspective else (1.0, 1.0)
         f = (inp.width / 2 * inp.p00, inp.height / 2 * inp.p11)
-        second = sum(
-            (z_q * (abs(n[a]) + rho * abs(m[a])) + z_o * abs(n[a])) / f[a] for a in (0, 1)
-        )
+        second = sum((z_q * (abs(n[a]) + rho * abs(m[a])) + z_o * abs(n[a])) / f[a] for a in (0, 1))
         return dot(n, qo) > 8 * inp.unit * first + second / 256
 
     def test(self, x: int, y: int, a: float, b: float) -> str:

@@ -100,7 +100,7 @@ def covered_in_words(triangle: Sequence[Point], size: tuple[int, int]) -> np.nda
 
 def inside_outline(outline: Sequence[Point], size: tuple[int, int]) -> np.ndarray:
     """(H, W) bool: even-odd rule for a closed polygon, by a ray to the right of moved centres."""
-    x, y = centres(size)
+    _, y = centres(size)
     inside = np.zeros((size[1], size[0]), bool)
     for p, q in zip(outline, [*outline[1:], outline[0]]):
         if p[1] == q[1]:
