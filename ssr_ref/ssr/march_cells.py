@@ -64,6 +64,119 @@ def cell_before(p: float, dp: float) -> int:
     return np.int64(np.ceil(p)) - 1 if dp > 0.0 else np.int64(np.floor(p))
 
 
+CANDIDATE, END, LIMIT = 0, 1, 2
+
+
+class Walker(NamedTuple):
+    """Where a walk is: the cell, borders left to cross and their s, the cell's interval."""
+
+    why: int  # CANDIDATE, END or LIMIT: why `next_candidate` stopped here
+    x: int
+    y: int
+    left_x: int
+    left_y: int
+    s_x: float
+    s_y: float
+    entry: float
+    leave: float
+    z_entry: float
+    z_leave: float
+    cells: int
+    empty: int
+    behind: int
+
+
+@kernel
+def start_walk(ray: Ray, x: int, y: int, x_last: int, y_last: int, a: float, b: float) -> Walker:
+    """A walker in its first cell, which it has not counted."""
+    left_x = max(0, (x_last - x) * (1 if ray.dp_x > 0.0 else -1)) if ray.dp_x != 0.0 else 0
+    left_y = max(0, (y_last - y) * (1 if ray.dp_y > 0.0 else -1)) if ray.dp_y != 0.0 else 0
+    border_x, border_y = x + (1 if ray.dp_x > 0.0 else 0), y + (1 if ray.dp_y > 0.0 else 0)
+    s_x = crossing(border_x, ray.p0_x, ray.dp_x) if left_x > 0 else np.inf
+    s_y = crossing(border_y, ray.p0_y, ray.dp_y) if left_y > 0 else np.inf
+    leave = min(max(min(s_x, s_y), a), b)
+    z_a, z_leave = depth_at(ray, a), depth_at(ray, leave)
+    return Walker(END, x, y, left_x, left_y, s_x, s_y, a, leave, z_a, z_leave, 0, 0, 0)
+
+
+@kernel
+def next_candidate(
+    width: int,
+    height: int,
+    slabs: F64Array,
+    ray: Ray,
+    b: float,
+    walker: Walker,
+    move: bool,
+    max_cells: int,
+) -> Walker:
+    """Go on over cells that are plain misses, to the first that the ray's interval meets.
+
+    move: leave the walker's cell first; without it the cell is tested itself. Apart from
+    `walk_cells`, because a loop with few live values is half as long.
+    """
+    step_x, step_y = 1 if ray.dp_x > 0.0 else -1, 1 if ray.dp_y > 0.0 else -1
+    ahead_x, ahead_y = 1 if step_x > 0 else 0, 1 if step_y > 0 else 0
+    outside_x, outside_y = width if step_x > 0 else -1, height if step_y > 0 else -1
+    p0_x, p0_y, dp_x, dp_y = ray.p0_x, ray.p0_y, ray.dp_x, ray.dp_y
+    _, x, y, left_x, left_y, s_x, s_y, entry, leave, z_entry, z_leave, cells, empty, behind = walker
+    why = END
+    while True:
+        if move:
+            if left_x == 0 and left_y == 0:
+                break
+            if s_x <= s_y:  # a corner crossed exactly steps x first
+                x += step_x
+                if x == outside_x:
+                    break
+                left_x -= 1
+                s_x = (x + ahead_x - p0_x) / dp_x if left_x > 0 else np.inf
+            else:
+                y += step_y
+                if y == outside_y:
+                    break
+                left_y -= 1
+                s_y = (y + ahead_y - p0_y) / dp_y if left_y > 0 else np.inf
+            entry, z_entry = leave, z_leave
+            # The cell is left where the nearer border is crossed, the last one at b.
+            leave = s_x if s_x < s_y else s_y
+            if not leave > entry:
+                leave = entry
+            if leave > b:
+                leave = b
+            z_leave = depth_at(ray, leave)
+        move = True
+        if cells == max_cells:
+            why = LIMIT
+            break
+        cells += 1
+        low = slabs[y, x, 0]
+        verdict = compare_with_slab(z_entry, z_leave, low, slabs[y, x, 1])
+        if low == np.inf:
+            empty += 1
+        elif verdict == IN_SLAB:
+            why = CANDIDATE
+            break
+        else:
+            behind += verdict == BEHIND
+    return Walker(
+        why,
+        x,
+        y,
+        left_x,
+        left_y,
+        s_x,
+        s_y,
+        entry,
+        leave,
+        z_entry,
+        z_leave,
+        cells,
+        empty,
+        behind,
+    )
+
+
 @kernel
 def walk_cells(
     view: ViewParams,
@@ -86,70 +199,32 @@ def walk_cells(
 
     skip_first: the first cell is the origin's own and is neither tested nor counted.
     """
-    reads = 2 if back.shape[0] > 0 else 1  # of a pixel that is not empty
-    step_x = 1 if ray.dp_x > 0.0 else -1
-    step_y = 1 if ray.dp_y > 0.0 else -1
-    left_x = max(0, (x_last - x) * step_x) if ray.dp_x != 0.0 else 0
-    left_y = max(0, (y_last - y) * step_y) if ray.dp_y != 0.0 else 0
-    ahead_x = 1 if step_x > 0 else 0
-    ahead_y = 1 if step_y > 0 else 0
-    outside_x = view.width if step_x > 0 else -1
-    outside_y = view.height if step_y > 0 else -1
-    s_x = crossing(x + ahead_x, ray.p0_x, ray.dp_x) if left_x > 0 else np.inf
-    s_y = crossing(y + ahead_y, ray.p0_y, ray.dp_y) if left_y > 0 else np.inf
-    entry = a
-    z_entry = depth_at(ray, entry)
-    flags = 0
-    cells = 0
-    fetches = 0
-    first = skip_first
     if x < 0 or y < 0 or x >= view.width or y >= view.height:
         return CellWalk(no_hit(), 0, 0, 0, False)
+    reads = 2 if back.shape[0] > 0 else 1  # of a pixel that is not empty
+    walker = start_walk(ray, x, y, x_last, y_last, a, b)
+    move = skip_first
+    refused = 0
+    hit = no_hit()
     while True:
-        # The cell is left where the nearer border is crossed, the last one at b.
-        leave = min(s_x, s_y)
-        leave = min(max(leave, entry), b)
-        z_leave = depth_at(ray, leave)
-        if not first:
-            if cells == max_cells:
-                return CellWalk(no_hit(), flags, cells, fetches, True)
-            cells += 1
-            low = slabs[y, x, 0]
-            verdict = compare_with_slab(z_entry, z_leave, low, slabs[y, x, 1])
-            if low == np.inf:
-                fetches += 1
-                flags |= OVER_EMPTY
-            else:
-                fetches += reads
-                if verdict == BEHIND:
-                    flags |= PASSED_BEHIND
-                elif verdict == IN_SLAB:
-                    z_front = np.float64(depth[y, x])
-                    if not rules.reject_self or above_tangent_plane(
-                        view, rules.rounding, ray, x, y, z_front, load3(normal, y, x)
-                    ):
-                        slab = load_slab(slabs, depth, back, x, y)
-                        hit = locate_hit(rules, ray, slab, x, y, entry, leave, True)
-                        return CellWalk(hit, flags, cells, fetches, False)
-                    flags |= SELF_REJECTED
-        first = False
-        if left_x == 0 and left_y == 0:
+        walker = next_candidate(view.width, view.height, slabs, ray, b, walker, move, max_cells)
+        if walker.why != CANDIDATE:
             break
-        if s_x <= s_y:
-            x += step_x
-            if x == outside_x:
-                break
-            left_x -= 1
-            s_x = crossing(x + ahead_x, ray.p0_x, ray.dp_x) if left_x > 0 else np.inf
-        else:
-            y += step_y
-            if y == outside_y:
-                break
-            left_y -= 1
-            s_y = crossing(y + ahead_y, ray.p0_y, ray.dp_y) if left_y > 0 else np.inf
-        entry = leave
-        z_entry = z_leave
-    return CellWalk(no_hit(), flags, cells, fetches, False)
+        x, y = walker.x, walker.y
+        z_front = np.float64(depth[y, x])
+        if not rules.reject_self or above_tangent_plane(
+            view, rules.rounding, ray, x, y, z_front, load3(normal, y, x)
+        ):
+            slab = load_slab(slabs, depth, back, x, y)
+            hit = locate_hit(rules, ray, slab, x, y, walker.entry, walker.leave, True)
+            break
+        refused = SELF_REJECTED
+        move = True
+    flags = refused
+    flags |= OVER_EMPTY if walker.empty > 0 else 0
+    flags |= PASSED_BEHIND if walker.behind > 0 else 0
+    fetches = walker.cells * reads - walker.empty * (reads - 1)
+    return CellWalk(hit, flags, walker.cells, fetches, walker.why == LIMIT)
 
 
 @kernel
