@@ -194,12 +194,12 @@ def assemble(
                     edges = coverage.make_edges(x0, y0, x1, y1, x2, y2)
                 else:
                     edges = coverage.make_edges(x0, y0, x2, y2, x1, y1)
-                if not (
-                    coverage.covers(edges, xa, ya)
-                    or coverage.covers(edges, xb, ya)
-                    or coverage.covers(edges, xa, yb)
-                    or coverage.covers(edges, xb, yb)
-                ):
+                covered = coverage.covers(edges, xa, ya)
+                if xb > xa:
+                    covered |= coverage.covers(edges, xb, ya)
+                if yb > ya:
+                    covered |= coverage.covers(edges, xa, yb) | coverage.covers(edges, xb, yb)
+                if not covered:
                     continue
             is_front = area < 0 or flags[t] & DOUBLE_SIDED
             if not is_front and not want_back:
@@ -352,21 +352,17 @@ def draw_front(
         x_first, x_last = columns & 0xFFFF, columns >> 16
         t = np.int64(parent[draw_id - nt]) if draw_id >= nt else draw_id
         edges = oriented_edges(draw_id, nt, snapped, faces, piece_snapped)
+        plane = triangle_plane(view, positions_vs, faces, t)
         y_first, y_last = max(row0, rows & 0xFFFF), min(last, rows >> 16)
         if x_last - x_first < SPAN_COLUMNS:
-            # Step the edge functions; a record that covers no centre needs no plane.
+            # Step the edge functions.
             c0 = edges.e0 + edges.a0 * x_first + edges.b0 * y_first
             c1 = edges.e1 + edges.a1 * x_first + edges.b1 * y_first
             c2 = edges.e2 + edges.a2 * x_first + edges.b2 * y_first
-            plane = surface.NearnessPlane(0.0, 0.0, 0.0)
-            planned = False
             for y in range(y_first, y_last + 1):
                 f0, f1, f2 = c0, c1, c2
                 for x in range(x_first, x_last + 1):
                     if (f0 | f1 | f2) >= 0:
-                        if not planned:
-                            plane = triangle_plane(view, positions_vs, faces, t)
-                            planned = True
                         k = surface.nearness_at(plane, x, y)
                         if k > nearness[y - row0, x]:
                             nearness[y - row0, x] = k
@@ -378,7 +374,6 @@ def draw_front(
                 c1 += edges.b1
                 c2 += edges.b2
         else:
-            plane = triangle_plane(view, positions_vs, faces, t)
             for y in range(y_first, y_last + 1):
                 row = y - row0
                 start = plane.c + plane.b * y
@@ -420,21 +415,17 @@ def draw_back(
         t = np.int64(parent[draw_id - nt]) if draw_id >= nt else draw_id
         edges = oriented_edges(draw_id, nt, snapped, faces, piece_snapped)
         mine = ANY_OBJECT if any_object else triangle_object[t]
+        plane = triangle_plane(view, positions_vs, faces, t)
         y_first, y_last = max(row0, rows & 0xFFFF), min(last, rows >> 16)
         if x_last - x_first < SPAN_COLUMNS:
-            # Step the edge functions; a record that covers no centre needs no plane.
+            # Step the edge functions.
             c0 = edges.e0 + edges.a0 * x_first + edges.b0 * y_first
             c1 = edges.e1 + edges.a1 * x_first + edges.b1 * y_first
             c2 = edges.e2 + edges.a2 * x_first + edges.b2 * y_first
-            plane = surface.NearnessPlane(0.0, 0.0, 0.0)
-            planned = False
             for y in range(y_first, y_last + 1):
                 f0, f1, f2 = c0, c1, c2
                 for x in range(x_first, x_last + 1):
                     if (f0 | f1 | f2) >= 0 and owner[y - row0, x] == mine:
-                        if not planned:
-                            plane = triangle_plane(view, positions_vs, faces, t)
-                            planned = True
                         k = surface.nearness_at(plane, x, y)
                         if k > nearness[y - row0, x] and k < front[y - row0, x]:
                             nearness[y - row0, x] = k
@@ -445,7 +436,6 @@ def draw_back(
                 c1 += edges.b1
                 c2 += edges.b2
         else:
-            plane = triangle_plane(view, positions_vs, faces, t)
             for y in range(y_first, y_last + 1):
                 row = y - row0
                 start = plane.c + plane.b * y
