@@ -18,6 +18,8 @@ _WHERE = {
     "Camera": "camera",
     "View": "camera",
     "look_at": "camera",
+    "Image": "texture",
+    "Texture": "texture",
     "DirectionalLight": "scene",
     "Lights": "scene",
     "Material": "scene",
@@ -49,6 +51,7 @@ __all__ = [
     "Frame",
     "GBuffer",
     "HitBuffer",
+    "Image",
     "Lights",
     "Material",
     "Mesh",
@@ -60,6 +63,7 @@ __all__ = [
     "SsrRefError",
     "SsrRefWarning",
     "Status",
+    "Texture",
     "View",
     "__version__",
     "load",
@@ -94,6 +98,8 @@ if TYPE_CHECKING:
     from .scene import Primitive as Primitive
     from .scene import Scene as Scene
     from .settings import Settings as Settings
+    from .texture import Image as Image
+    from .texture import Texture as Texture
 
 
 def __getattr__(name: str) -> Any:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import transforms
 from .errors import SceneError
+from .texture import Image, Texture
 from .typed import F32Array, F64Array, I32Array, Rgb
 
 if TYPE_CHECKING:
@@ -37,6 +38,10 @@ class Material:
     """A metallic-roughness material, linear RGB.
 
     R, the share of the reflection, is `metallic · base_color` unless `reflectivity` is given.
+    Textures multiply their factors: base colour and emission by the decoded sRGB image, alpha by
+    the image's alpha, roughness by green and metallic by blue of the linear one.
+    alpha_cutoff: where alpha (factor · texture · vertex) is below it nothing is drawn; None:
+    opaque, whatever the alpha. unlit: radiance is the base colour.
     """
 
     name: str = "material"
@@ -46,13 +51,21 @@ class Material:
     emissive: Rgb = (0.0, 0.0, 0.0)
     reflectivity: Rgb | None = None
     double_sided: bool = False
+    alpha: float = 1.0
+    alpha_cutoff: float | None = None
+    unlit: bool = False
+    base_color_texture: Texture | None = None
+    metallic_roughness_texture: Texture | None = None
+    emissive_texture: Texture | None = None
 
     def __post_init__(self) -> None:
         for name in ("base_color", "emissive", "reflectivity"):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, _rgb(value, f"{self.name}: {name}"))
-        for name in ("metallic", "roughness"):
+        for name in ("metallic", "roughness", "alpha", "alpha_cutoff"):
+            if getattr(self, name) is None:
+                continue
             number = float(getattr(self, name))
             if not (np.isfinite(number) and number >= 0.0):
                 raise SceneError(
@@ -61,6 +74,12 @@ class Material:
                 )
             object.__setattr__(self, name, number)
         object.__setattr__(self, "double_sided", bool(self.double_sided))
+        object.__setattr__(self, "unlit", bool(self.unlit))
+
+    @property
+    def textures(self) -> tuple[Texture | None, Texture | None, Texture | None]:
+        """Base colour, metallic-roughness, emission."""
+        return (self.base_color_texture, self.metallic_roughness_texture, self.emissive_texture)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +88,8 @@ class Primitive:
 
     positions (n, 3) float32 in mesh space; faces (m, 3) int32, counter-clockwise seen from
     outside; normals (n, 3) float32 or None for flat shading; colors (n, 3) float32 linear RGB that
-    multiplies the base colour, or None.
+    multiplies the base colour, or None; uv0, uv1 (n, 2) float32 texture coordinates or None, v
+    down; alphas (n,) float32 that multiplies alpha, or None.
     """
 
     positions: F32Array
@@ -77,6 +97,9 @@ class Primitive:
     material: int = 0
     normals: F32Array | None = None
     colors: F32Array | None = None
+    uv0: F32Array | None = None
+    uv1: F32Array | None = None
+    alphas: F32Array | None = None
 
     def __post_init__(self) -> None:
         positions = _frozen(self.positions, np.float32, "positions")
@@ -88,11 +111,11 @@ class Primitive:
                 f"a face refers to vertex {faces.min() if faces.min() < 0 else faces.max()} of "
                 f"{len(positions)}; expected 0 to {len(positions) - 1}: fix the indices"
             )
-        for name in ("normals", "colors"):
+        for name, columns in (("normals", 3), ("colors", 3), ("uv0", 2), ("uv1", 2), ("alphas", 0)):
             value = getattr(self, name)
             if value is None:
                 continue
-            array = _frozen(value, np.float32, name)
+            array = _frozen(value, np.float32, name, columns)
             if len(array) != len(positions):
                 raise SceneError(
                     f"{len(array)} {name} for {len(positions)} vertices; expected one for each"
@@ -100,13 +123,18 @@ class Primitive:
             object.__setattr__(self, name, array)
 
 
-def _frozen(value: Any, dtype: Any, name: str) -> Any:
-    """A read-only C-contiguous (n, 3) copy, so that neither side can change the other."""
+def _frozen(value: Any, dtype: Any, name: str, columns: int = 3) -> Any:
+    """A read-only C-contiguous (n, columns) copy, so that neither side can change the other.
+
+    columns 0: an (n,) array.
+    """
     array = np.array(value, dtype=dtype, order="C", copy=True)
+    expected = (columns,) if columns else ()
     if array.size == 0:
-        array = array.reshape(0, 3)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise SceneError(f"{name} has shape {array.shape}; expected (n, 3)")
+        array = array.reshape(0, *expected)
+    if array.shape[1:] != expected:
+        shape = f"(n, {columns})" if columns else "(n,)"
+        raise SceneError(f"{name} has shape {array.shape}; expected {shape}")
     array.setflags(write=False)
     return array
 
@@ -196,10 +224,31 @@ class Lights:
             ) from None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadReport:
+    """What a loader made of a file.
+
+    triangles : kept, each mesh once. degenerate, non_finite : kept triangles that cannot be seen:
+    two corners in one place, or a NaN or infinite coordinate. skipped : what was left out and why,
+    counted. fallbacks : materials that fell back to their factors or the default, by name.
+    unsupported : features of the file that are not drawn, by name. textures : (name, W, H).
+    """
+
+    format: str
+    triangles: int = 0
+    degenerate: int = 0
+    non_finite: int = 0
+    skipped: tuple[str, ...] = ()
+    fallbacks: tuple[str, ...] = ()
+    unsupported: tuple[str, ...] = ()
+    textures: tuple[tuple[str, int, int], ...] = ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """Everything that is drawn, with lights and the view it was made for (if any).
 
+    images: what textures refer to. report: the loader's, None for scenes made by code.
     Raises SceneError for an index out of range, a singular transform, or no usable triangle.
     """
 
@@ -210,8 +259,17 @@ class Scene:
     view: View | None = None
     name: str = "scene"
     notes: tuple[str, ...] = ()
+    images: tuple[Image, ...] = ()
+    report: LoadReport | None = None
 
     def __post_init__(self) -> None:
+        for material in self.materials:
+            for texture in material.textures:
+                if texture is not None and not 0 <= texture.image < len(self.images):
+                    raise SceneError(
+                        f"material '{material.name}' uses image {texture.image} of "
+                        f"{len(self.images)}; expected 0 to {len(self.images) - 1}"
+                    )
         for mesh in self.meshes:
             for primitive in mesh.primitives:
                 if not 0 <= primitive.material < len(self.materials):
@@ -295,8 +353,25 @@ class Scene:
                     material.double_sided,
                 ]
                 digest.update(json.dumps(values).encode())
+                self._update_optional(digest, primitive, material)
         digest.update(json.dumps(self.lights.to_json()).encode())
         return digest.hexdigest()
+
+    def _update_optional(self, digest: Any, primitive: Primitive, material: Material) -> None:
+        """Hash what most scenes do not have; what is absent adds nothing."""
+        for name in ("uv0", "uv1", "alphas"):
+            array = getattr(primitive, name)
+            if array is not None:
+                digest.update(name.encode() + array.astype("<f4").tobytes())
+        extra = [material.alpha, material.alpha_cutoff, material.unlit]
+        if extra != [1.0, None, False]:
+            digest.update(json.dumps(extra).encode())
+        for slot, texture in enumerate(material.textures):
+            if texture is not None:
+                pixels = self.images[texture.image].pixels
+                reading = asdict(texture) | {"image": [slot, pixels.dtype.str, *pixels.shape]}
+                digest.update(json.dumps(reading, sort_keys=True).encode())
+                digest.update(pixels.astype(pixels.dtype.newbyteorder("<")).tobytes())
 
 
 def _check_transform(node: Node) -> None:

@@ -21,22 +21,27 @@ LAYERS = [
     ["vecmath"],
     ["transforms"],
     ["camera"],
+    ["texture"],
     ["scene"],
     ["settings"],
     ["buffers"],
     ["scenes"],
     ["raster"],
     ["shading"],
+    ["depth"],
     ["ssr"],
+    ["maths"],
     ["pipeline"],
+    ["study"],
     ["report"],
     ["fileio"],
     ["cli"],
     ["__main__"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
-CORE = {"errors", "typed", "_jit", "vecmath", "transforms", "camera", "scene", "settings"}
-CORE |= {"buffers", "scenes", "raster", "shading", "ssr", "pipeline"}
+CORE = {"errors", "typed", "_jit", "vecmath", "transforms", "camera", "texture", "scene"}
+CORE |= {"settings"}
+CORE |= {"buffers", "scenes", "raster", "shading", "depth", "ssr", "maths", "pipeline"}
 OUTSIDE_CORE = {"imageio", "trimesh", "typer", "rich", "OpenEXR", "PIL", "matplotlib"}
 
 

@@ -1,0 +1,1 @@
+"""Depth as devices store it, and linear view depth."""

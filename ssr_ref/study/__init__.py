@@ -1,0 +1,1 @@
+"""Measuring the kernels: exact oracles and test vectors."""
