@@ -11,7 +11,8 @@ import numpy as np
 from .buffers import GBuffer, HitBuffer, Resolved
 from .camera import Camera, View, ViewParams
 from .raster.geometry import Geometry, flatten
-from .raster.rasterize import RasterOptions, rasterize
+from .raster.rasterize import RasterOptions, rasterize, visible_textures
+from .raster.textures import TextureStore, texture_store
 from .scene import Scene
 from .scenes import framed_view
 from .settings import NEAR_PER_RADIUS, Settings
@@ -62,10 +63,11 @@ def render(
         camera = make_camera(scene, camera, settings, radius)
         view = camera.params(settings.size)
         geometry = flatten(scene)
+        store = texture_store(scene)
     with stages("raster"):
-        gbuffer, positions_vs = rasterize(view, geometry, raster_options(settings))
+        gbuffer, positions_vs = rasterize(view, geometry, raster_options(settings), store=store)
     with stages("radiance"):
-        gbuffer = with_radiance(view, geometry, positions_vs, gbuffer, scene)
+        gbuffer = with_radiance(view, geometry, positions_vs, gbuffer, scene, store)
     with stages("trace"):
         hits = trace(view, gbuffer, settings, stages.within("trace"))
     with stages("resolve"):
@@ -105,13 +107,19 @@ def raster_options(settings: Settings) -> RasterOptions:
 
 
 def with_radiance(
-    view: ViewParams, geometry: Geometry, positions_vs: np.ndarray, gbuffer: GBuffer, scene: Scene
+    view: ViewParams,
+    geometry: Geometry,
+    positions_vs: np.ndarray,
+    gbuffer: GBuffer,
+    scene: Scene,
+    store: TextureStore | None = None,
 ) -> GBuffer:
-    """The G-buffer with its radiance image."""
+    """The G-buffer with its radiance image; store: as in `rasterize`."""
     radiance = np.empty((*gbuffer.depth.shape, 3), gbuffer.depth.dtype)
     shade_radiance(
         view,
         geometry,
+        visible_textures(geometry, gbuffer.triangle_id, store),
         positions_vs,
         gbuffer.triangle_id,
         light_arrays(scene.lights),

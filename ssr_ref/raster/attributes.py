@@ -15,7 +15,7 @@ from .._jit import driver, inlined, kernel
 from ..camera import ViewParams, rotate_to_view
 from ..typed import F32Array, F64Array, FloatArray, I32Array, I64Array
 from ..vecmath.vec import Vec3, dot, normalize, scale
-from .geometry import DOUBLE_SIDED, HAS_COLORS, HAS_NORMALS, Geometry
+from .geometry import DOUBLE_SIDED, HAS_COLORS, HAS_NORMALS, TEXTURED, Geometry
 from .surface import (
     Barycentric,
     BarycentricFrame,
@@ -28,6 +28,7 @@ from .surface import (
     run_end,
     surface_point,
 )
+from .textures import BASE, METALLIC_ROUGHNESS, Textures, sample_material
 
 SMALLEST_SQUARE, LARGEST_SQUARE = 2.0**-900, 2.0**900
 """A squared length in between has lost nothing to overflow or underflow."""
@@ -45,7 +46,7 @@ class SurfaceRun(NamedTuple):
     back_side: bool  # a double-sided face seen from behind
     smooth: bool  # the vertices have normals
     normal_varies: bool  # and they differ
-    varies: bool  # the normals or the colours differ
+    varies: bool  # the normals, the colours or the texture's values differ
 
 
 @inlined
@@ -76,6 +77,7 @@ def begin_run(view: ViewParams, geometry: Geometry, positions_vs: F64Array, t: i
     varies = normal_varies
     if (geometry.triangle_flags[t] & HAS_COLORS) != 0:
         varies = varies or not rows_equal(geometry.colors, i0, i1, i2)
+    varies = varies or (geometry.triangle_flags[t] & TEXTURED) != 0
     return SurfaceRun(plane, frame, n, back_side, smooth, normal_varies, varies)
 
 
@@ -128,10 +130,13 @@ def shading_normal_ws(
 
 
 @inlined
-def base_color(geometry: Geometry, t: int, b: Barycentric) -> Vec3:
-    """Material base colour times the vertex colour."""
+def base_color(geometry: Geometry, textures: Textures | None, t: int, b: Barycentric) -> Vec3:
+    """Material base colour times the texture, times the vertex colour."""
     m = geometry.triangle_material[t]
     color = Vec3(geometry.base_color[m, 0], geometry.base_color[m, 1], geometry.base_color[m, 2])
+    if textures is not None:
+        texel = sample_material(textures, geometry.faces, t, m, BASE, b)
+        color = Vec3(color.x * texel.r, color.y * texel.g, color.z * texel.b)
     if (geometry.triangle_flags[t] & HAS_COLORS) == 0:
         return color
     v = mix(geometry.colors, geometry.faces[t, 0], geometry.faces[t, 1], geometry.faces[t, 2], b)
@@ -139,17 +144,36 @@ def base_color(geometry: Geometry, t: int, b: Barycentric) -> Vec3:
 
 
 @inlined
+def metallic_roughness(
+    geometry: Geometry, textures: Textures | None, t: int, b: Barycentric
+) -> tuple[float, float]:
+    """Metallic (times blue) and roughness (times green of the texture)."""
+    m = geometry.triangle_material[t]
+    metallic, roughness = geometry.metallic[m], geometry.roughness[m]
+    if textures is not None:
+        texel = sample_material(textures, geometry.faces, t, m, METALLIC_ROUGHNESS, b)
+        metallic *= texel.b
+        roughness *= texel.g
+    return metallic, roughness
+
+
+@inlined
 def normal_reflectivity(
-    geometry: Geometry, t: int, albedo: Vec3, fresnel: bool, max_roughness: float
+    geometry: Geometry,
+    t: int,
+    albedo: Vec3,
+    metallic: float,
+    roughness: float,
+    fresnel: bool,
+    max_roughness: float,
 ) -> Vec3:
     """R at normal incidence: own reflectivity, or metallic · base colour (+ 0.04 with Fresnel)."""
-    m = geometry.triangle_material[t]
-    if geometry.roughness[m] > max_roughness:
+    if roughness > max_roughness:
         return Vec3(0.0, 0.0, 0.0)
+    m = geometry.triangle_material[t]
     own = geometry.own_reflectivity
     if not np.isnan(own[m, 0]):
         return Vec3(own[m, 0], own[m, 1], own[m, 2])
-    metallic = geometry.metallic[m]
     f0 = (1.0 - metallic) * DIELECTRIC_F0 if fresnel else 0.0
     return Vec3(metallic * albedo.x + f0, metallic * albedo.y + f0, metallic * albedo.z + f0)
 
@@ -218,6 +242,7 @@ def shade_normals(
 def shade_materials(
     view: ViewParams,
     geometry: Geometry,
+    textures: Textures | None,
     positions_vs: F64Array,
     triangle_id: I32Array,
     fresnel: bool,
@@ -228,7 +253,10 @@ def shade_materials(
     reflectivity: FloatArray,
     roughness: FloatArray,
 ) -> None:
-    """Ids, base colour, reflectivity at normal incidence and roughness of visible surfaces."""
+    """Ids, base colour, reflectivity at normal incidence and roughness of visible surfaces.
+
+    textures: of the visible materials; None, and not paid for, where none has any.
+    """
     for y in prange(view.height):
         x = 0
         while x < view.width:
@@ -252,24 +280,36 @@ def shade_materials(
                     geometry.faces[t, 1],
                     geometry.faces[t, 2],
                 )
-            a = base_color(geometry, t, Barycentric(1.0, 0.0, 0.0))
-            r = normal_reflectivity(geometry, t, a, fresnel, max_roughness)
             m = geometry.triangle_material[t]
+            if textures is not None:
+                varies = varies or (geometry.triangle_flags[t] & TEXTURED) != 0
             if varies:
                 run = begin_run(view, geometry, positions_vs, t)
                 for j in range(np.uint64(x), np.uint64(end)):
-                    a = base_color(geometry, t, weights_at(view, run, j, y))
-                    r = normal_reflectivity(geometry, t, a, fresnel, max_roughness)
+                    b = weights_at(view, run, j, y)
+                    a = base_color(geometry, textures, t, b)
+                    metallic, rough = metallic_roughness(geometry, textures, t, b)
                     store3(albedo, y, j, a)
-                    store3(reflectivity, y, j, r)
+                    store3(
+                        reflectivity,
+                        y,
+                        j,
+                        normal_reflectivity(
+                            geometry, t, a, metallic, rough, fresnel, max_roughness
+                        ),
+                    )
+                    roughness[y, j] = rough
             else:
+                metallic, rough = geometry.metallic[m], geometry.roughness[m]
+                a = base_color(geometry, None, t, Barycentric(1.0, 0.0, 0.0))
+                r = normal_reflectivity(geometry, t, a, metallic, rough, fresnel, max_roughness)
                 for j in range(np.uint64(x), np.uint64(end)):
                     store3(albedo, y, j, a)
                     store3(reflectivity, y, j, r)
+                    roughness[y, j] = rough
             for j in range(np.uint64(x), np.uint64(end)):
                 object_id[y, j] = geometry.triangle_object[t]
                 material_id[y, j] = m
-                roughness[y, j] = geometry.roughness[m]
             x = end
 
 

@@ -14,8 +14,8 @@ from ..camera import check_size
 from ..errors import SceneError
 from ..typed import AnyArray, F32Array, I32Array, I64Array, Size
 from . import coverage
+from .assemble import column_range
 from .clip import snap_float32, snap_float64
-from .visibility import column_range
 
 
 def draw_clip_space(

@@ -12,12 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import transforms
-from ..scene import Scene
+from ..scene import Material, Scene
 from ..typed import F32Array, F64Array, I32Array, U8Array
 
 DOUBLE_SIDED = 1
 HAS_NORMALS = 2
 HAS_COLORS = 4
+TEXTURED = 8
+MASKED = 16
+UNLIT = 32
 
 
 class Geometry(NamedTuple):
@@ -33,7 +36,7 @@ class Geometry(NamedTuple):
     faces: I32Array  # (nt, 3)
     triangle_object: I32Array  # (nt,)
     triangle_material: I32Array  # (nt,)
-    triangle_flags: U8Array  # (nt,) DOUBLE_SIDED | HAS_NORMALS | HAS_COLORS
+    triangle_flags: U8Array  # (nt,) the bits above
     base_color: F64Array  # (nm, 3)
     emissive: F64Array  # (nm, 3)
     own_reflectivity: F64Array  # (nm, 3)
@@ -61,6 +64,8 @@ def flatten(scene: Scene) -> Geometry:
     materials = np.empty(nt, np.int32)
     flags = np.zeros(nt, np.uint8)
 
+    material_flags = [_flags(material) for material in scene.materials]
+
     v = t = 0
     for index, node, primitive in placed:
         m = node.world_from_mesh
@@ -79,8 +84,7 @@ def flatten(scene: Scene) -> Geometry:
         faces[t:t_end] += v
         objects[t:t_end] = index
         materials[t:t_end] = primitive.material
-        if scene.materials[primitive.material].double_sided:
-            flags[t:t_end] |= DOUBLE_SIDED
+        flags[t:t_end] |= material_flags[primitive.material]
         v, t = v_end, t_end
 
     nan = (np.nan, np.nan, np.nan)
@@ -98,3 +102,11 @@ def flatten(scene: Scene) -> Geometry:
         metallic=np.array([m.metallic for m in scene.materials], np.float64),
         roughness=np.array([m.roughness for m in scene.materials], np.float64),
     )
+
+
+def _flags(material: Material) -> np.uint8:
+    bits = DOUBLE_SIDED if material.double_sided else 0
+    bits |= TEXTURED if any(t is not None for t in material.textures) else 0
+    bits |= MASKED if material.alpha_cutoff is not None else 0
+    bits |= UNLIT if material.unlit else 0
+    return np.uint8(bits)

@@ -9,10 +9,11 @@ import numpy as np
 
 from ..buffers import GBuffer, RasterCounts
 from ..camera import ViewParams
-from ..typed import F64Array
-from . import attributes, visibility
-from .geometry import Geometry
-from .visibility import Bins, Pieces, Projected
+from ..typed import BoolArray, F64Array, I32Array
+from . import assemble, attributes, visibility
+from .geometry import MASKED, TEXTURED, Geometry
+from .records import BAND_ROWS, Bins, Pieces, Projected
+from .textures import Textures, TextureStore
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +35,7 @@ def project(view: ViewParams, geometry: Geometry, gpu_vertices: bool = False) ->
     """Vertices in view space, snapped window positions, outcodes."""
     nv = len(geometry.positions_ws)
     projected = Projected(np.empty((nv, 3)), np.empty((nv, 2), np.int32), np.empty(nv, np.uint8))
-    visibility.project_vertices(view, gpu_vertices, geometry.positions_ws, *projected)
+    assemble.project_vertices(view, gpu_vertices, geometry.positions_ws, *projected)
     return projected
 
 
@@ -43,9 +44,11 @@ def rasterize(
     geometry: Geometry,
     options: RasterOptions,
     reuse: GBuffer | None = None,
+    store: TextureStore | None = None,
 ) -> tuple[GBuffer, F64Array]:
     """The G-buffer without radiance, and the view-space vertices (nv, 3) for later stages.
 
+    store: the scene's textures; None: materials show their factors and nothing is masked.
     reuse: an earlier G-buffer whose arrays may be overwritten where shape and dtype agree; touching
     fresh memory costs more than drawing into it.
     """
@@ -71,6 +74,7 @@ def rasterize(
         geometry,
         projected,
         options,
+        store,
         image("depth", options.dtype),
         triangle_id,
         image("back_depth", options.dtype, wanted=options.back_depth),
@@ -93,6 +97,7 @@ def rasterize(
         attributes.shade_materials(
             view,
             geometry,
+            visible_textures(geometry, triangle_id, store),
             projected.positions_vs,
             triangle_id,
             options.fresnel,
@@ -106,12 +111,12 @@ def rasterize(
     gbuffer = GBuffer(
         counts=RasterCounts(
             triangles=len(geometry.faces),
-            drawn=int(counts[visibility.DRAWN]),
-            outside=int(counts[visibility.OUT_OF_VIEW]),
-            clipped=int(counts[visibility.CLIPPED]),
-            culled=int(counts[visibility.CULLED]),
-            zero_area=int(counts[visibility.ZERO_AREA]),
-            non_finite=int(counts[visibility.UNUSABLE]),
+            drawn=int(counts[assemble.DRAWN]),
+            outside=int(counts[assemble.OUT_OF_VIEW]),
+            clipped=int(counts[assemble.CLIPPED]),
+            culled=int(counts[assemble.CULLED]),
+            zero_area=int(counts[assemble.ZERO_AREA]),
+            non_finite=int(counts[assemble.UNUSABLE]),
             clamped_depths=int(clamped),
             repaired_normals=int(repaired.sum()),
         ),
@@ -125,18 +130,19 @@ def draw_visibility(
     geometry: Geometry,
     projected: Projected,
     options: RasterOptions,
+    store: TextureStore | None,
     depth: Any,
     triangle_id: Any,
     back_depth: Any,
 ) -> tuple[Any, int]:
     """Fill depth, triangle id and back depth; the counters and the number of clamped pixels."""
     capacity = 0
-    if (projected.outcode & (visibility.NEAR | visibility.GUARD)).any():
-        capacity = visibility.count_pieces(geometry.faces, projected.outcode)
+    if (projected.outcode & (assemble.NEAR | assemble.GUARD)).any():
+        capacity = assemble.count_pieces(geometry.faces, projected.outcode)
     room = len(geometry.faces) + capacity
     front = np.empty((room, 3), np.int32)
     back = np.empty((room if options.back_depth else 0, 3), np.int32)
-    n_front, n_back, n_pieces, parent, snapped, nearness, counts = visibility.assemble(
+    n_front, n_back, n_pieces, parent, snapped, nearness, counts = assemble.assemble(
         view,
         options.gpu_vertices,
         projected,
@@ -148,9 +154,17 @@ def draw_visibility(
         back,
     )
     pieces = Pieces(parent[:n_pieces], snapped[:n_pieces], nearness[:n_pieces])
-    bands = -(-view.height // visibility.BAND_ROWS)
-    front_bins = Bins(front[:n_front], *visibility.bin_records(front[:n_front], bands))
-    back_bins = Bins(back[:n_back], *visibility.bin_records(back[:n_back], bands))
+    bands = -(-view.height // BAND_ROWS)
+    front, back = front[:n_front], back[:n_back]
+    front_cutouts = back_cutouts = textures = None
+    if store is not None and store.masked.any():
+        # Only masked triangles that may be seen cost anything.
+        front_masked, back_masked = (masked_records(geometry, pieces, r) for r in (front, back))
+        if front_masked.any() or back_masked.any():
+            front_cutouts = binned(front[front_masked], bands)
+            back_cutouts = binned(back[back_masked], bands)
+            front, back = front[~front_masked], back[~back_masked]
+            textures = store.pack(geometry, store.masked)
     clamped = np.zeros(bands, np.int64)
     visibility.draw_bands(
         view,
@@ -158,8 +172,11 @@ def draw_visibility(
         projected,
         geometry,
         pieces,
-        front_bins,
-        back_bins,
+        binned(front, bands),
+        binned(back, bands),
+        front_cutouts,
+        back_cutouts,
+        textures,
         options.back_depth,
         options.back_any_object,
         depth,
@@ -168,6 +185,34 @@ def draw_visibility(
         clamped,
     )
     return counts, int(clamped.sum())
+
+
+def binned(records: I32Array, bands: int) -> Bins:
+    """Draw records sorted into bands of rows."""
+    return Bins(records, *assemble.bin_records(records, bands))
+
+
+def masked_records(geometry: Geometry, pieces: Pieces, records: I32Array) -> BoolArray:
+    """(n,) which records belong to a masked material."""
+    ids = records[:, 0]
+    nt = len(geometry.faces)
+    if len(pieces.parent):
+        ids = np.where(ids < nt, ids, pieces.parent[np.maximum(ids - nt, 0)])
+    return np.asarray((geometry.triangle_flags[ids] & MASKED) != 0)
+
+
+def visible_textures(
+    geometry: Geometry, triangle_id: I32Array, store: TextureStore | None
+) -> Textures | None:
+    """The textures of the materials that the image shows; None if it shows no textured one."""
+    if store is None or not store.textured.any():
+        return None
+    seen = np.zeros(len(geometry.faces) + 1, np.bool_)
+    seen[triangle_id] = True  # −1, nothing drawn, is the last
+    textured = seen[:-1] & ((geometry.triangle_flags & TEXTURED) != 0)
+    materials = np.zeros(len(geometry.metallic), np.bool_)
+    materials[geometry.triangle_material[textured]] = True
+    return store.pack(geometry, materials)
 
 
 def farthest_nearness(view: ViewParams) -> float:

@@ -1,6 +1,6 @@
 """Diffuse radiance: ambient, directional lights, emission. It does not depend on the eye.
 
-    L = albedo · (ambient + Σ color · max(0, n·l)) + emissive
+    L = albedo · (ambient + Σ color · max(0, n·l)) + emissive;  unlit materials: L = albedo
 
 Lit in world space from float64 normals: a flat face has the same bits from every camera, and a
 correct reflection shows exactly the colour that the camera sees directly.
@@ -14,17 +14,19 @@ import numpy as np
 from numba import prange
 
 from .. import transforms
-from .._jit import driver, kernel
+from .._jit import driver, inlined, kernel
 from ..camera import ViewParams
 from ..raster.attributes import (
+    SurfaceRun,
     base_color,
     begin_run,
     shading_normal_ws,
     store3,
     weights_at,
 )
-from ..raster.geometry import Geometry
+from ..raster.geometry import UNLIT, Geometry
 from ..raster.surface import Barycentric, load, plane_normal, run_end
+from ..raster.textures import EMISSIVE, Textures, sample_material
 from ..scene import Lights
 from ..typed import F64Array, FloatArray, I32Array
 from ..vecmath.vec import Vec3, dot, normalize
@@ -77,16 +79,51 @@ def flat_normal_ws(geometry: Geometry, t: int, away: bool) -> Vec3:
     return normalize(Vec3(n.x / largest, n.y / largest, n.z / largest))
 
 
+@inlined
+def emission(geometry: Geometry, textures: Textures | None, t: int, b: Barycentric) -> Vec3:
+    """Emissive factor times its texture."""
+    m = geometry.triangle_material[t]
+    color = load(geometry.emissive, m)
+    if textures is not None:
+        texel = sample_material(textures, geometry.faces, t, m, EMISSIVE, b)
+        color = Vec3(color.x * texel.r, color.y * texel.g, color.z * texel.b)
+    return color
+
+
+@inlined
+def leaving_radiance(
+    geometry: Geometry,
+    textures: Textures | None,
+    lights: LightArrays,
+    run: SurfaceRun,
+    t: int,
+    b: Barycentric,
+    flat: Vec3,
+) -> Vec3:
+    """Radiance of triangle t at b; `flat` is its geometric normal on the side seen."""
+    albedo = base_color(geometry, textures, t, b)
+    if (geometry.triangle_flags[t] & UNLIT) != 0:
+        return albedo
+    usable, n = False, flat
+    if run.smooth:
+        usable, n = shading_normal_ws(geometry, run, t, b)
+    return diffuse(albedo, n if usable else flat, emission(geometry, textures, t, b), lights)
+
+
 @driver()
 def shade_radiance(
     view: ViewParams,
     geometry: Geometry,
+    textures: Textures | None,
     positions_vs: F64Array,
     triangle_id: I32Array,
     lights: LightArrays,
     radiance: FloatArray,
 ) -> None:
-    """Radiance of every visible surface; 0 where nothing was drawn."""
+    """Radiance of every visible surface; 0 where nothing was drawn.
+
+    textures: of the visible materials; None, and not paid for, where none has any.
+    """
     for y in prange(view.height):
         x = 0
         while x < view.width:
@@ -99,23 +136,14 @@ def shade_radiance(
                 continue
             run = begin_run(view, geometry, positions_vs, t)
             flat = flat_normal_ws(geometry, t, run.back_side)
-            m = geometry.triangle_material[t]
-            emissive = load(geometry.emissive, m)
-            corner = Barycentric(1.0, 0.0, 0.0)
-            usable, n = False, flat
-            if run.smooth:
-                usable, n = shading_normal_ws(geometry, run, t, corner)
-            color = diffuse(
-                base_color(geometry, t, corner), n if usable else flat, emissive, lights
-            )
-            for j in range(np.uint64(x), np.uint64(end)):
-                if run.varies:
+            if run.varies:
+                for j in range(np.uint64(x), np.uint64(end)):
                     b = weights_at(view, run, j, y)
-                    usable, n = False, flat
-                    if run.smooth:
-                        usable, n = shading_normal_ws(geometry, run, t, b)
-                    color = diffuse(
-                        base_color(geometry, t, b), n if usable else flat, emissive, lights
-                    )
-                store3(radiance, y, j, color)
+                    color = leaving_radiance(geometry, textures, lights, run, t, b, flat)
+                    store3(radiance, y, j, color)
+            else:
+                b = Barycentric(1.0, 0.0, 0.0)
+                color = leaving_radiance(geometry, None, lights, run, t, b, flat)
+                for j in range(np.uint64(x), np.uint64(end)):
+                    store3(radiance, y, j, color)
             x = end
