@@ -12,6 +12,7 @@ from ssr_ref.camera import Camera
 from ssr_ref.pipeline import with_radiance
 from ssr_ref.raster.geometry import flatten
 from ssr_ref.raster.rasterize import RasterOptions, rasterize
+from ssr_ref.raster.textures import texture_store
 from ssr_ref.scene import Material, Mesh, Node, Primitive, Scene
 
 TWO_SIDED = Material("two-sided", double_sided=True)
@@ -34,10 +35,11 @@ def draw(scene: Scene, camera: Camera, size: tuple[int, int], **options: Any) ->
     """The scene's G-buffer with radiance; float64 unless told otherwise."""
     view = camera.params(size)
     geometry = flatten(scene)
-    g, positions_vs = rasterize(view, geometry, RasterOptions(**{"dtype": np.float64, **options}))
-    return Drawn(
-        with_radiance(view, geometry, positions_vs, g, scene), positions_vs, geometry.faces
-    )
+    store = texture_store(scene)
+    chosen = RasterOptions(**{"dtype": np.float64, **options})
+    g, positions_vs = rasterize(view, geometry, chosen, store=store)
+    lit = with_radiance(view, geometry, positions_vs, g, scene, store)
+    return Drawn(lit, positions_vs, geometry.faces)
 
 
 def soup(

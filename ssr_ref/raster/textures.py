@@ -182,7 +182,7 @@ def _fill_decoding(linear: F64Array, srgb: F64Array) -> None:
 
 @kernel
 def wrap_coordinate(u: float, mode: int) -> float:
-    """u brought into [0, 1]; NaN and infinity become 0."""
+    """u brought into [0, 1]; what overflowed becomes 0."""
     if not np.isfinite(u):
         return 0.0
     if mode == REPEAT:
@@ -220,7 +220,14 @@ def sample(
     u: float,
     v: float,
 ) -> Texel:
-    """Texture s at texture coordinates (u, v), before the texture's own transform."""
+    """Texture s at texture coordinates (u, v), before the texture's own transform.
+
+    A coordinate that is NaN or infinite reads as 0.
+    """
+    if not np.isfinite(u):
+        u = 0.0
+    if not np.isfinite(v):
+        v = 0.0
     width, height = slots[s, WIDTH], slots[s, HEIGHT]
     wrap_u, wrap_v = slots[s, WRAP_U], slots[s, WRAP_V]
     tu = affine[s, 0] * u + affine[s, 1] * v + affine[s, 2]
