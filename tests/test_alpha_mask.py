@@ -187,7 +187,9 @@ def test_a_masked_reflection() -> None:
     masked = replace(MASK, double_sided=True)
     made = scene([leaf, floor], (masked, mirror))
     view = ssr_ref.View(eye=(0.3, 1.2, 4.0), target=(0, 0.5, 0))
-    settings = Settings(size=(61, 41), thickness_from="constant", tracer="cells")
+    settings = Settings(
+        size=(61, 41), thickness_from="constant", tracer="cells", buffer_dtype="float64"
+    )
     frame = ssr_ref.render(made, view, settings)
     solid = ssr_ref.render(
         scene([leaf, floor], (replace(masked, alpha_cutoff=None), mirror)), view, settings
