@@ -156,7 +156,7 @@ def compile_seconds() -> dict[str, float]:
         metadata: dict[Any, Any] = getattr(dispatcher, "get_metadata", dict)() or {}
         total = sum(
             timer.get("compiler_lock", 0.0) or timer.get("llvm_lock", 0.0)
-            for timer in (m.get("timers", {}) for m in metadata.values())
+            for timer in ((m or {}).get("timers", {}) for m in metadata.values())
         )
         if metadata:
             found[dispatcher.py_func.__name__] = total
