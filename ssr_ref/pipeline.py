@@ -151,6 +151,9 @@ def frame_warnings(
         visible = np.unique(gbuffer.material_id[seen])
         reflective = geometry.metallic[visible] > 0.0
         reflective |= np.nan_to_num(geometry.own_reflectivity[visible]).max(axis=1) > 0.0
+        # A metallic-roughness map speaks for each pixel; its factors alone mean nothing.
+        mapped = [m.metallic_roughness_texture is not None for m in scene.materials]
+        reflective &= ~np.array(mapped, bool)[visible]
         rough = reflective & (geometry.roughness[visible] > settings.max_roughness)
         blurred = reflective & ~rough & (geometry.roughness[visible] > 0.0)
         if rough.any():

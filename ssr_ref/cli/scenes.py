@@ -1,18 +1,44 @@
-"""`ssr-ref scenes`: the built-in scenes."""
+"""`ssr-ref scenes`: the built-in scenes, as lines, as JSON, or as a page with pictures."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
+from ..errors import SettingsError
 from .output import Output
 
 
-def scenes(ctx: typer.Context) -> None:
+def scenes(
+    ctx: typer.Context,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.html", help="Render every scene small and write one page about them."
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a page that is there.")] = False,
+) -> None:
     """List the built-in scenes."""
     from ..scenes import BUILTIN
 
     out: Output = ctx.obj
+    if html is None:
+        if force:
+            raise SettingsError("--force is given without --html; expected both, or neither")
+        if out.json:
+            out.data({name: builtin.description for name, builtin in BUILTIN.items()})
+        else:
+            out.facts([(name, builtin.description) for name, builtin in BUILTIN.items()])
+        return
+
+    from ..report.scene_list import write_scene_page
+
+    with out.progress() as progress:
+        entries = write_scene_page(html, force=force, progress=progress)
     if out.json:
-        out.data({name: builtin.description for name, builtin in BUILTIN.items()})
-    else:
-        out.facts([(name, builtin.description) for name, builtin in BUILTIN.items()])
+        out.data({"page": str(html), "scenes": {entry.name: entry.facts for entry in entries}})
+    elif not out.quiet:
+        out.facts([("page", str(html)), ("scenes", str(len(entries)))])

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from importlib import import_module
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -25,33 +26,36 @@ MIRROR_FLOOR = "added mirror floor"
 
 
 class Builtin(NamedTuple):
-    """A built-in scene: one line about it, and the function of the tessellation that makes it."""
+    """A built-in scene: one line on what it is for, and what makes it of the tessellation."""
 
     description: str
     make: Callable[[int], Scene]
 
 
-def _teapot(tessellation: int) -> Scene:
-    from .teapot import teapot
+def _module(name: str) -> Callable[[int], Scene]:
+    """The function of the module and the name `name`, imported when it is called."""
 
-    return teapot(tessellation)
+    def make(tessellation: int) -> Scene:
+        function = getattr(import_module(f".{name}", __name__), name)
+        return cast("Scene", function(tessellation))
 
-
-def _poles(tessellation: int) -> Scene:
-    from .poles import poles
-
-    return poles(tessellation)
+    return make
 
 
 BUILTIN: dict[str, Builtin] = {
-    "teapot": Builtin(
-        "a reflective Newell teapot on a mirror floor, with a box, a sphere and two walls", _teapot
-    ),
-    "poles": Builtin(
-        "posts from thick to one pixel thin on a mirror floor before a striped wall", _poles
-    ),
+    name: Builtin(description, _module(name))
+    for name, description in {
+        "teapot": "Newell's teapot must reflect its own spout, which no environment map can show",
+        "poles": "posts from thick to one pixel thin: what a large step or stride misses",
+        "spheres": "mirror, metal and diffuse spheres: curved and mutual reflections, contact",
+        "corridor": "two facing mirrors: reflections of reflections, and what is hidden or unseen",
+        "steps": "boxes floating over a mirror: a gap must show under each, so thickness matters",
+        "water": "a city behind a rippled basin: grazing and long rays, near and far depths",
+        "curved": "a mirror ball and a mirror cylinder: neighbouring rays end far apart",
+        "textured": "wraps, a transform, 16 bits, leaf masks, emission and a metal map by a pool",
+    }.items()
 }
-"""Built-in scenes by name."""
+"""Built-in scenes by name; each is made by the function of that name in the module of that name."""
 
 
 def build(name: str, tessellation: int | None = None) -> Scene:

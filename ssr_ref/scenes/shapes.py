@@ -1,4 +1,4 @@
-"""Primitives made by code: quad, box, flat grid, sphere, round post.
+"""Primitives made by code: quad, boxes, flat grid, checker, sphere, round post.
 
 Faces are counter-clockwise seen from outside. Closed shapes are watertight: neighbouring faces use
 bit-equal positions. Only + − × ÷ and square roots (spec 1.2), so the bytes are the same everywhere.
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..scene import Primitive
-from ..typed import AnyArray, F32Array, F64Array, I32Array
+from ..typed import AnyArray, F32Array, F64Array, I32Array, Rgb
 
 BOX_QUADS = (
     (0, 4, 6, 2),  # −x
@@ -22,6 +22,9 @@ BOX_QUADS = (
     (4, 5, 7, 6),  # +z
 )
 """Corner numbers of a box's sides; bit 0, 1, 2 of a number says low or high x, y, z."""
+_BOX_RIGHT = ((0, 0, 1), (0, 0, -1), (1, 0, 0), (1, 0, 0), (-1, 0, 0), (1, 0, 0))
+_BOX_DOWN = ((0, -1, 0), (0, -1, 0), (0, 0, -1), (0, 0, 1), (0, -1, 0), (0, -1, 0))
+"""Directions of u and v of the sides in `BOX_QUADS`."""
 
 
 def split_quads(quads: AnyArray | Sequence[Sequence[int]]) -> I32Array:
@@ -30,9 +33,19 @@ def split_quads(quads: AnyArray | Sequence[Sequence[int]]) -> I32Array:
     return q[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
 
 
-def quad(corners: Sequence[Sequence[float]], *, material: int = 0) -> Primitive:
-    """Two triangles of four corners, counter-clockwise seen from the front; flat, open."""
-    return Primitive(np.asarray(corners, np.float32), split_quads([[0, 1, 2, 3]]), material)
+def quad(
+    corners: Sequence[Sequence[float]],
+    *,
+    uv: Sequence[Sequence[float]] | None = None,
+    material: int = 0,
+) -> Primitive:
+    """Two triangles of four corners, counter-clockwise seen from the front; flat, open.
+
+    uv: (4, 2) texture coordinates of the corners, or None.
+    """
+    uv0 = None if uv is None else np.asarray(uv, np.float32)
+    faces = split_quads([[0, 1, 2, 3]])
+    return Primitive(np.asarray(corners, np.float32), faces, material, uv0=uv0)
 
 
 def box(low: Sequence[float], high: Sequence[float], *, material: int = 0) -> Primitive:
@@ -40,6 +53,60 @@ def box(low: Sequence[float], high: Sequence[float], *, material: int = 0) -> Pr
     ends = (low, high)
     corners = [[ends[i >> axis & 1][axis] for axis in range(3)] for i in range(8)]
     return Primitive(np.array(corners, np.float32), split_quads(BOX_QUADS), material)
+
+
+def unwrapped_box(low: Sequence[float], high: Sequence[float], *, material: int = 0) -> Primitive:
+    """A `box` whose sides have vertices of their own, 24 in all, and texture coordinates.
+
+    uv0 is in scene units, from a side's upper left corner as seen from outside: u right, v down.
+    The top is seen with −z up, the bottom with +z up.
+    """
+    shape = box(low, high)
+    corners = shape.positions[np.array(BOX_QUADS)]
+    p = corners.astype(np.float64)
+    right = np.array(_BOX_RIGHT, np.float64)[:, None, :]
+    down = np.array(_BOX_DOWN, np.float64)[:, None, :]
+    u = (p[:, :, 0] * right[..., 0] + p[:, :, 1] * right[..., 1]) + p[:, :, 2] * right[..., 2]
+    v = (p[:, :, 0] * down[..., 0] + p[:, :, 1] * down[..., 1]) + p[:, :, 2] * down[..., 2]
+    u, v = u - u.min(axis=1, keepdims=True), v - v.min(axis=1, keepdims=True)
+    return Primitive(
+        corners.reshape(-1, 3),
+        split_quads(np.arange(24).reshape(6, 4)),
+        material,
+        uv0=np.stack([u, v], axis=2).reshape(-1, 2).astype(np.float32),
+    )
+
+
+def layered_box(
+    low: Sequence[float],
+    high: Sequence[float],
+    layers: Sequence[tuple[float, Rgb]],
+    *,
+    material: int = 0,
+) -> Primitive:
+    """A closed, flat box with a colour gradient from bottom to top.
+
+    layers: at least two (share of the height, colour), the shares rising from 0 to 1; colours are
+    linear RGB and change linearly between them. 8 triangles a layer and 4 for bottom and top.
+    """
+    rings, colors = [], []
+    for share, color in layers:
+        y = low[1] + (high[1] - low[1]) * share
+        # Counter-clockwise seen from above.
+        rings += [(low[0], y, high[2]), (high[0], y, high[2]), (high[0], y, low[2])]
+        rings += [(low[0], y, low[2])]
+        colors += [color] * 4
+    n = 4 * len(layers)
+    i = np.arange(n - 4)
+    after = i - i % 4 + (i + 1) % 4
+    sides = np.stack([i, after, after + 4, i + 4], axis=1)
+    ends = [[3, 2, 1, 0], [n - 4, n - 3, n - 2, n - 1]]
+    return Primitive(
+        np.array(rings, np.float32),
+        split_quads(np.concatenate([sides, ends])),
+        material,
+        colors=np.array(colors, np.float32),
+    )
 
 
 def grid(
@@ -55,6 +122,31 @@ def grid(
     index = np.arange((cells_z + 1) * (cells_x + 1)).reshape(cells_z + 1, cells_x + 1)
     quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=2)
     return Primitive(positions.reshape(-1, 3).astype(np.float32), split_quads(quads), material)
+
+
+def checker(
+    half_x: float,
+    half_z: float,
+    cells_x: int,
+    cells_z: int,
+    colors: tuple[Rgb, Rgb],
+    *,
+    material: int = 0,
+) -> Primitive:
+    """A `grid` whose cells alternate between two linear colours, each with its own vertices; open.
+
+    The cell at the least x and z has the first colour.
+    """
+    flat = grid(half_x, half_z, cells_x, cells_z)
+    corners = flat.faces.reshape(-1, 6)[:, [0, 1, 2, 5]]
+    row, column = np.divmod(np.arange(cells_x * cells_z), cells_x)
+    cell_colors = np.array(colors, np.float32)[(row + column) % 2]
+    return Primitive(
+        flat.positions[corners].reshape(-1, 3),
+        split_quads(np.arange(4 * len(corners)).reshape(-1, 4)),
+        material,
+        colors=np.repeat(cell_colors, 4, axis=0),
+    )
 
 
 def sphere(radius: float, frequency: int, *, material: int = 0) -> Primitive:
