@@ -302,7 +302,11 @@ class Scene:
         high = np.full(3, -np.inf)
         for node in self.nodes:
             for primitive in self.meshes[node.mesh].primitives:
-                used = primitive.positions[np.unique(primitive.faces)]
+                drawn = np.zeros(len(primitive.positions), np.bool_)
+                drawn[primitive.faces.ravel()] = (
+                    True  # a sort of all corners takes 10 times as long
+                )
+                used = primitive.positions[drawn]
                 used.setflags(write=False)  # as primitive.positions are: one compiled signature
                 points = np.empty((len(used), 3))
                 transforms.transform_points(node.world_from_mesh, used, points)

@@ -27,6 +27,8 @@ from ..errors import FileError, SceneError, SettingsError
 from ..scene import Material, Mesh, Node, Primitive, Scene
 from ..typed import F32Array, F64Array, I32Array, I64Array, Rgb
 from .gltf import Gltf, GltfPrimitive, file_error, linear_colors, read_gltf
+from .gltf_scene import load_gltf
+from .options import LoadOptions
 
 NormalsName = Literal["authored", "flat", "smooth"]
 
@@ -693,8 +695,8 @@ def _smooth_normals(
 
 
 _LOADERS: dict[str, Callable[[Path, bytes], Scene]] = {
-    ".glb": _load_gltf,
-    ".gltf": _load_gltf,
+    ".glb": lambda path, data: load_gltf(path, data, LoadOptions()),
+    ".gltf": lambda path, data: load_gltf(path, data, LoadOptions()),
     ".obj": _load_obj,
     ".ply": _load_ply,
     ".stl": _load_stl,
