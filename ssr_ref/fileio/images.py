@@ -1,9 +1,10 @@
 """Image files to `Image`, and back to PNG.
 
-PNG is decoded by `png_codec.py`, so its codes never depend on a library's version. JPEG and WebP go
-through Pillow: their decoders are not defined to the last bit, so their codes may differ by 1
-between versions of libjpeg or libwebp. Colour profiles, gamma chunks and EXIF orientation are
-ignored, as glTF 2.0, section 3.9.2 and 3.8.3, demands.
+8-bit PNG, JPEG and WebP go through Pillow; 16-bit PNG and greys of fewer than 8 bits through pypng,
+because Pillow reads 16-bit colour as 8 bits and compares tRNS with scaled greys. The decoders of
+JPEG and WebP are not defined to the last bit, so their codes may differ by 1 between versions of
+libjpeg or libwebp; PNG is lossless. Colour profiles, gamma chunks and EXIF orientation are ignored,
+as glTF 2.0, sections 3.8.3 and 3.9.2, demands.
 
 Files are untrusted: the size is read from the header and checked before memory is taken.
 """
@@ -20,7 +21,11 @@ import numpy as np
 from ..errors import FileError, SceneError
 from ..texture import MAX_IMAGE_PIXELS, Image, check_image_size
 from ..typed import AnyArray
-from .png_codec import SIGNATURE, decode_png, image_error
+
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+_MOST_INFLATED = 1032
+"""DEFLATE makes at most 1032 bytes of one (258 bytes for 2 bits)."""
 
 _STORED = 65535
 """Most bytes of one stored DEFLATE block (RFC 1951, section 3.2.4)."""
@@ -34,7 +39,7 @@ def read_image(name: str, data: bytes) -> Image:
     another format, damaged, truncated or animated data, CMYK, or a size over `texture`'s limits.
     """
     if data.startswith(SIGNATURE):
-        pixels = decode_png(name, data)
+        pixels = _read_png(name, data)
     elif data.startswith(b"\xff\xd8\xff"):
         pixels = _through_pillow(name, data, "JPEG")
     elif data[:4] == b"RIFF" and data[8:12] == b"WEBP":
@@ -49,18 +54,70 @@ def read_image(name: str, data: bytes) -> Image:
     return Image(name, pixels)
 
 
+def image_error(name: str, found: str, expected: str) -> FileError:
+    """A FileError of one line about an image."""
+    return FileError(" ".join(f"image '{name}' {found}; expected {expected}".split()))
+
+
+def _read_png(name: str, data: bytes) -> AnyArray:
+    """Check the header, then decode by the library that gets this kind right."""
+    if len(data) < 33 or data[12:16] != b"IHDR":
+        raise image_error(name, "has no PNG header", "a valid PNG file: export it again")
+    width, height, depth, color = struct.unpack(">IIBB", data[16:26])
+    try:
+        check_image_size(name, width, height)
+    except SceneError as error:
+        raise FileError(" ".join(str(error).split())) from None
+    if width * height * depth > 8 * _MOST_INFLATED * len(data):
+        raise image_error(
+            name,
+            f"says {width} × {height} texels in {len(data)} bytes",
+            "a whole PNG file: it is cut short, export it again",
+        )
+    if depth == 16 or (color == 0 and depth < 8):
+        return _through_pypng(name, data)
+    return _through_pillow(name, data, "PNG")
+
+
+def _through_pypng(name: str, data: bytes) -> AnyArray:
+    import png
+
+    try:
+        reader = png.Reader(bytes=data)
+        reader.preamble()
+        wide = reader.bitdepth == 16
+        width, height, rows, _ = reader.asRGBA() if wide else reader.asRGBA8()
+        pixels = np.empty((height, width, 4), np.uint16 if wide else np.uint8)
+        filled = 0
+        for y, row in enumerate(rows):
+            pixels[y] = np.asarray(row, pixels.dtype).reshape(width, 4)
+            filled += 1
+        if filled != height:
+            raise ValueError(f"{filled} of {height} rows")
+    except Exception as error:  # what pypng raises depends on the damage
+        raise image_error(
+            name,
+            f"cannot be read as PNG ({type(error).__name__}: {str(error)[:120]})",
+            "a valid PNG file: export it again",
+        ) from None
+    return pixels
+
+
 def _through_pillow(name: str, data: bytes, kind: str) -> AnyArray:
     from PIL import Image as PillowImage
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Pillow's own size warning: the limits here are lower
+            if kind == "PNG":
+                with PillowImage.open(io.BytesIO(data), formats=(kind,)) as file:
+                    file.verify()  # the chunks' checksums, which decoding alone passes over
             with PillowImage.open(io.BytesIO(data), formats=(kind,)) as file:
                 check_image_size(name, *file.size)
                 # The second picture of a stereo JPEG is no animation: the first is the image.
                 if kind != "JPEG" and getattr(file, "is_animated", False):
                     raise image_error(name, "is animated", "a still image: export one frame")
-                if file.mode not in ("1", "L", "LA", "RGB", "RGBA", "RGBX"):
+                if file.mode not in ("1", "L", "LA", "P", "RGB", "RGBA", "RGBX"):
                     raise image_error(name, f"is {kind} in {file.mode}", "grey or RGB: convert it")
                 return np.asarray(file.convert("RGBA"))
     except SceneError as error:
