@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-GLOBAL_FLAGS = ("--quiet", "-q", "--json", "--version")
+GLOBAL_FLAGS = ("--quiet", "-q", "--verbose", "-v", "--json", "--version")
 MAX_THREADS = 1024
 
 

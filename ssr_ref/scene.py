@@ -232,6 +232,7 @@ class LoadReport:
     two corners in one place, or a NaN or infinite coordinate. skipped : what was left out and why,
     counted. fallbacks : materials that fell back to their factors or the default, by name.
     unsupported : features of the file that are not drawn, by name. textures : (name, W, H).
+    generated_normals : primitives whose normals the loader made.
     """
 
     format: str
@@ -242,6 +243,7 @@ class LoadReport:
     fallbacks: tuple[str, ...] = ()
     unsupported: tuple[str, ...] = ()
     textures: tuple[tuple[str, int, int], ...] = ()
+    generated_normals: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -302,11 +304,9 @@ class Scene:
         high = np.full(3, -np.inf)
         for node in self.nodes:
             for primitive in self.meshes[node.mesh].primitives:
-                drawn = np.zeros(len(primitive.positions), np.bool_)
-                drawn[primitive.faces.ravel()] = (
-                    True  # a sort of all corners takes 10 times as long
-                )
-                used = primitive.positions[drawn]
+                is_used = np.zeros(len(primitive.positions), np.bool_)
+                is_used[primitive.faces] = True  # a sort of all corners takes 10 times as long
+                used = primitive.positions[is_used]
                 used.setflags(write=False)  # as primitive.positions are: one compiled signature
                 points = np.empty((len(used), 3))
                 transforms.transform_points(node.world_from_mesh, used, points)

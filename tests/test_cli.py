@@ -156,6 +156,7 @@ def test_module_entry():
     ("line", "expected"),
     [
         ("render a --quiet", (["--quiet"], ["render", "a"], None)),
+        ("render a -v --verbose", (["-v", "--verbose"], ["render", "a"], None)),
         ("--json info b", (["--json"], ["info", "b"], None)),
         ("render a -q --threads 3 -o x", (["-q"], ["render", "a", "-o", "x"], "3")),
         ("--threads=2 scenes", ([], ["scenes"], "2")),
@@ -247,8 +248,13 @@ def test_scene_options_reach_the_loader(folder, rendered, monkeypatch):
         return made_up_frame().scene
 
     monkeypatch.setattr("ssr_ref.fileio.load.load", load)
-    run_line("render teapot -o out --mirror-floor --normals smooth --tessellation 5 --no-previews")
-    assert asked == [("teapot", {"normals": "smooth", "mirror_floor": True, "tessellation": 5})]
+    line = "render teapot -o out --mirror-floor --normals smooth --tessellation 5 --no-previews"
+    run_line(line + " --up z --unit cm --strict --allow-outside --scene 2 --force")
+    run_line(line + " --scene Front --force")
+    plain = {"normals": "smooth", "mirror_floor": True, "tessellation": 5, "up": "y"}
+    plain |= {"unit": None, "strict": False, "allow_outside": False, "scene": "Front"}
+    given = {"up": "z", "unit": "cm", "strict": True, "allow_outside": True, "scene": 2}
+    assert asked == [("teapot", plain | given), ("teapot", plain)]
 
 
 def test_lens_options_change_the_scenes_view(folder, rendered):

@@ -423,7 +423,7 @@ def test_bad_options(name, value):
 def test_good_options():
     options = LoadOptions(normals="crease", up="z", unit="inch", strict=True, scene="a")
     assert options.scene == "a"
-    assert LoadOptions() == LoadOptions(scene=None, unit="m")
+    assert LoadOptions() == LoadOptions(scene=None, unit=None)
 
 
 def test_strict_refuses_what_is_not_drawn():

@@ -5,10 +5,8 @@ from __future__ import annotations
 import base64
 import copy
 import json
-import logging
 import os
 import random
-import struct
 import subprocess
 import sys
 import types
@@ -21,13 +19,13 @@ from typing import Any
 import numpy as np
 import pytest
 from glb_file import TRIANGLE, Glb, one_triangle
+from mesh_files import fails, same_bits
 
 import ssr_ref
 from ssr_ref import transforms
 from ssr_ref.errors import FileError, SettingsError
-from ssr_ref.fileio import meshes as meshes_module
 from ssr_ref.fileio.load import load
-from ssr_ref.fileio.meshes import FORMATS, load_mesh, with_normals
+from ssr_ref.fileio.meshes import load_mesh
 from ssr_ref.fileio.scene_glb import scene_glb_bytes, write_scene_glb
 from ssr_ref.scene import Lights, Material, Mesh, Node, Primitive, Scene
 
@@ -35,24 +33,6 @@ CUBE_CORNERS = np.array(
     [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32
 )  # corner 4x + 2y + z
 CUBE_QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-
-
-def same_bits(a: Any, b: Any) -> bool:
-    a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
-    return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
-
-
-def fails(path: Path, *words: str, call: Callable[..., Any] = load_mesh, **options: Any) -> str:
-    """The one line of the FileError that `call(path)` must raise, with all of `words` in it."""
-    with pytest.raises(FileError) as caught:
-        call(path, **options)
-    message = str(caught.value)
-    assert "\n" not in message
-    assert "expected" in message
-    assert len(message) < 700
-    for word in words:
-        assert word in message, message
-    return message
 
 
 # ------------------------------------------------------------------ glTF: arrays
@@ -454,306 +434,7 @@ def test_damaged_glb_never_raises_anything_else(tmp_path):
     assert 0 < loaded < 1500
 
 
-# --------------------------------------------------------------- files of any kind
-
-
-BINARY_STL_2 = bytes(80) + struct.pack("<I", 2) + np.zeros((2, 50), np.uint8).tobytes()
-PLY_HEAD = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
-PLY_HEAD += "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
-OBJ_TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
-
-BAD_FILES: dict[str, tuple[str, bytes | str, str]] = {
-    "glb garbage": ("a.glb", b"\x00\x01garbage\xff" * 9, "not a glTF"),
-    "glb magic only": ("a.glb", b"glTF", "truncated"),
-    "gltf broken JSON": ("a.gltf", '{"asset": {"version": "2.0"', "JSON"),
-    "gltf deep JSON": ("a.gltf", "[" * 100_000, "JSON"),
-    "gltf a list": ("a.gltf", "[]", "version"),
-    "ply garbage": ("a.ply", b"\x89\xff\x00\x12" * 40, "PLY"),
-    "ply without end": ("a.ply", "ply\nformat ascii 1.0\nelement vertex 3\n", "PLY"),
-    "ply truncated vertices": ("a.ply", PLY_HEAD + "0 0 0\n1 0 0\n", "2 vertex rows"),
-    "ply truncated face": ("a.ply", PLY_HEAD + "0 0 0\n1 0 0\n0 1 0\n", "face"),
-    "ply text for number": ("a.ply", PLY_HEAD + "0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n", "PLY"),
-    "ply bad index": ("a.ply", PLY_HEAD + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "vertex 3 of 3"),
-    "ply negative index": ("a.ply", PLY_HEAD + "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n", "vertex -1"),
-    "ply points only": (
-        "a.ply",
-        PLY_HEAD.replace("face 1", "face 0") + "0 0 0\n1 0 0\n0 1 0\n",
-        "no triangles (3 vertices",
-    ),
-    "ply edges only": ("a.ply", PLY_HEAD + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "no triangles"),
-    "ply all NaN": ("a.ply", PLY_HEAD + "nan 0 0\nnan 0 0\nnan 1 0\n3 0 1 2\n", "NaN"),
-    "stl garbage": ("a.stl", b"\x12\x34\xff" * 60, "no triangles"),
-    "stl short": ("a.stl", b"\x12\x34", "no triangles"),
-    "stl truncated": ("a.stl", BINARY_STL_2[:-1], "no triangles (183 bytes"),
-    "stl none": ("a.stl", bytes(84), "no triangles"),
-    "stl ASCII cut": ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "ASCII"),
-    "stl all NaN": (
-        "a.stl",
-        bytes(80) + struct.pack("<I", 1) + np.full(12, np.nan, "<f4").tobytes() + b"\0\0",
-        "NaN",
-    ),
-    "obj garbage": ("a.obj", b"\xff\xfe\x00\x12" * 40, "no triangles"),
-    "obj points only": ("a.obj", OBJ_TRIANGLE, "no triangles (3 vertices"),
-    "obj lines only": ("a.obj", OBJ_TRIANGLE + "l 1 2 3\n", "no triangles"),
-    "obj text for number": ("a.obj", "v 0 0 0\nv 1 x 0\nv 0 1 0\nf 1 2 3\n", "OBJ"),
-    "obj short vertex": ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1\nf 1 2 3\n", "2 coordinates"),
-    "obj two corners": ("a.obj", OBJ_TRIANGLE + "f 1 2\n", "line 4"),
-    "obj index zero": ("a.obj", OBJ_TRIANGLE + "f 0 1 2\n", "line 4"),
-    "obj text for index": ("a.obj", OBJ_TRIANGLE + "f 1 2 3\nf 1 2 c\n", "line 5"),
-    "obj index too large": ("a.obj", OBJ_TRIANGLE + "f 1 2 4\n", "OBJ"),
-    "obj index too low": ("a.obj", OBJ_TRIANGLE + "f -1 -2 -4\n", "line 4"),
-    "obj missing normals": ("a.obj", OBJ_TRIANGLE + "vn 0 0 1\nf 1//1 2//1 3//2\n", "normals"),
-    "obj mixed corners": ("a.obj", OBJ_TRIANGLE + "vn 0 0 1\nf 1//1 2//1 3\n", "line 5"),
-    "obj all NaN": ("a.obj", "v nan 0 0\nv nan 0 0\nv nan 1 0\nf 1 2 3\n", "NaN"),
-    **{f"empty {ext}": (f"a{ext}", b"", "empty (0 bytes)") for ext in FORMATS},
-    "unknown extension": ("a.fbx", b"Kaydara FBX", "'.fbx'"),
-    "no extension": ("mesh", b"v 0 0 0", ".glb, .gltf, .obj, .ply, .stl"),
-}
-
-
-@pytest.mark.parametrize("name", BAD_FILES)
-def test_bad_file_is_one_silent_line(tmp_path, name, capfd, caplog, recwarn):
-    file, data, word = BAD_FILES[name]
-    path = tmp_path / file
-    path.write_bytes(data.encode() if isinstance(data, str) else data)
-    before = path.read_bytes()
-    assert str(path) in fails(path, word)
-    assert path.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == [file]
-    assert capfd.readouterr() == ("", "")
-    assert not caplog.records
-    assert not recwarn.list
-
-
-def test_trimesh_is_silenced_and_then_as_before(caplog, capfd):
-    logger = logging.getLogger("trimesh")
-    with meshes_module._strict_and_silent():
-        logger.error("unheard")
-    assert not caplog.records
-    logger.error("heard")
-    assert [record.message for record in caplog.records] == ["heard"]
-    assert capfd.readouterr().out == ""
-
-
-@pytest.mark.parametrize("ext", [*FORMATS, ".xyz"])
-def test_missing_directory_and_unreadable(tmp_path, ext, monkeypatch):
-    path = tmp_path / f"a{ext}"
-    fails(path, "no such file")
-    fails(tmp_path / ("a" * 300 + ext), "expected")  # a name too long for the file system
-    fails(Path(f"a\0b{ext}"), "expected")
-    path.mkdir()
-    fails(path, "is a directory")
-    path.rmdir()
-    if hasattr(os, "mkfifo"):
-        os.mkfifo(path)
-        fails(path, "a pipe")
-        path.unlink()
-    if ext != ".xyz":
-        path.write_bytes(b"x")
-
-        def refuse(self: Path) -> bytes:  # root reads everything, so chmod would not do
-            raise PermissionError(13, "Permission denied")
-
-        monkeypatch.setattr(Path, "read_bytes", refuse)
-        fails(path, "Permission denied", "permissions")
-
-
-def test_truncated_binary_files_never_give_half_a_scene(tmp_path):
-    ply = PLY_HEAD.replace("ascii", "binary_little_endian").encode() + TRIANGLE.tobytes()
-    ply += struct.pack("<B3i", 3, 0, 1, 2)
-    stl = tmp_path / "a.stl"
-    (tmp_path / "a.ply").write_bytes(ply)
-    assert load_mesh(tmp_path / "a.ply").triangle_count == 1
-    for length in range(1, len(ply)):
-        (tmp_path / "a.ply").write_bytes(ply[:length])
-        fails(tmp_path / "a.ply")
-    for length in range(1, len(BINARY_STL_2)):
-        stl.write_bytes(BINARY_STL_2[:length])
-        fails(stl)
-
-
-# ---------------------------------------------------------------------------- OBJ
-
-
-def write(path: Path, text: str) -> Path:
-    path.write_text(text)
-    return path
-
-
-def test_obj_objects_materials_and_authored_normals(tmp_path):
-    write(
-        tmp_path / "a.mtl",
-        "newmtl red\nKd 0.3 0.1 0.7\nKe 0 2 0\nPm 0.75\nPr 0.1\nmap_Kd missing.png\n",
-    )
-    write(tmp_path / "b c.mtl", "newmtl dull grey\nKd 0.5\nbump bump.png\nd 0.5\n")
-    path = write(
-        tmp_path / "two.OBJ",
-        "mtllib a.mtl\nmtllib b c.mtl\nmtllib gone.mtl\n"
-        + OBJ_TRIANGLE
-        + "v 0.1 0.2 1e-3\nvn 0.6 0 0.8\nvn 0 0.1 0\n"
-        "o first thing\nusemtl red\nf 1//1 2//1 3//2\nusemtl dull grey\nf 1 2 4\n"
-        "o second\nusemtl red\nf 2//1 3//1 4//1\nusemtl nobody\nf 1 3 4\n"
-        "o first thing\nusemtl red\nf 1//2 3//2 4//2\n",
-    )
-    scene = load_mesh(path)
-    assert [n.name for n in scene.nodes] == ["first thing", "second"]
-    first, second = scene.meshes
-    red, grey, unknown = scene.materials
-    # Kd 0.3 as written (trimesh's material would give 77/255), one number for all channels.
-    assert red == Material("red", (0.3, 0.1, 0.7), 0.75, 0.1, (0.0, 2.0, 0.0))
-    assert grey == Material("dull grey", (0.5, 0.5, 0.5))
-    assert unknown == Material()
-    assert [p.material for p in (*first.primitives, *second.primitives)] == [0, 1, 0, 2]
-    shiny = first.primitives[0]
-    # Corners with the same position and normal share a vertex, numbered by first use.
-    corners = shiny.positions[shiny.faces].tolist()
-    p = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.1, 0.2, 1e-3]], np.float32)
-    assert corners == p[[[0, 1, 2], [0, 2, 3]]].tolist()
-    n = np.array([[0.6, 0, 0.8], [0, 0.1, 0]], np.float32)
-    assert shiny.normals is not None
-    assert shiny.normals[shiny.faces].tolist() == n[[[0, 0, 1], [1, 1, 1]]].tolist()
-    assert shiny.faces.tolist() == [[0, 1, 2], [3, 2, 4]]
-    assert first.primitives[1].normals is None
-    assert scene.notes == (
-        "2 textures are not drawn yet: base colour factor used",
-        "1 .mtl file is missing or unreadable",
-        "1 material is in no .mtl file: grey is used",
-    )
-
-
-def test_obj_polygons_negative_indices_and_odd_spacing(tmp_path):
-    path = write(
-        tmp_path / "odd.obj",
-        "# comment\n  v\t0 0 0 # origin\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 \\\n -2   -1\n"
-        "s off\ng a b\n"
-        "v 0 0 1\nv 1 0 1\nv 2 1 1\nv 1 2 1\nv 0 1 1\nvt 0 0\nf -5/1 -4/1 -3/-1 -2/1 -1/1\n"
-        "f 1/ 2/ 3/\r\n",
-    )
-    scene = load_mesh(path)
-    corners = [
-        triangle
-        for primitive in scene.meshes[0].primitives
-        for triangle in primitive.positions[primitive.faces].tolist()
-    ]
-    v = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    v += [[0, 0, 1], [1, 0, 1], [2, 1, 1], [1, 2, 1], [0, 1, 1]]
-    indices = [(0, 1, 2), (0, 2, 3), (0, 1, 2), (4, 5, 6), (4, 6, 7), (4, 7, 8)]
-    assert corners == [[v[i] for i in triangle] for triangle in indices]
-    assert len(scene.nodes) == 1
-
-
-def test_obj_vertex_colours(tmp_path):
-    rows = "v 0 0 0 0.1 0.2 0.3\nv 1 0 0 nan nan nan\nv 0 1 0 0 1 2.5\nf 1 2 3\n"
-    scene = load_mesh(write(tmp_path / "c.obj", rows))
-    (primitive,) = scene.meshes[0].primitives
-    expected = np.array([[0.1, 0.2, 0.3], [1, 1, 1], [0, 1, 2.5]], np.float32)
-    assert same_bits(primitive.colors, expected)  # not rounded to bytes
-    assert scene.materials == (Material(base_color=(1.0, 1.0, 1.0)),)
-    assert scene.notes == (
-        "1 vertex colour is NaN or infinite: white is used",
-        "1 vertex colour is above 1: used as linear RGB",
-    )
-    mixed = load_mesh(write(tmp_path / "m.obj", "v 0 0 1\n" + rows.replace("f 1", "f 4 1")))
-    assert mixed.meshes[0].primitives[0].colors is None
-    assert mixed.notes == ("vertex colours are not used: some vertices have none",)
-
-
-def test_obj_vertex_order_is_that_of_first_use(tmp_path):
-    """trimesh's own order of split vertices depends on an unstable sort, so on the processor."""
-    rng = random.Random(5)
-    rows = [f"v {rng.uniform(-1, 1)} {rng.uniform(-1, 1)} {rng.uniform(-1, 1)}" for _ in range(40)]
-    rows += [f"vn {rng.uniform(-1, 1)} {rng.uniform(-1, 1)} 1" for _ in range(30)]
-    pairs = [[(rng.randint(1, 40), rng.randint(1, 30)) for _ in range(3)] for _ in range(300)]
-    rows += ["f " + " ".join(f"{v}//{n}" for v, n in face) for face in pairs]
-    (primitive,) = load_mesh(write(tmp_path / "a.obj", "\n".join(rows))).meshes[0].primitives
-    numbers = {pair: i for i, pair in enumerate(dict.fromkeys(p for face in pairs for p in face))}
-    assert primitive.faces.tolist() == [[numbers[pair] for pair in face] for face in pairs]
-
-
-# -------------------------------------------------------------------- PLY and STL
-
-
-def test_ply_ascii_and_binary_agree(tmp_path):
-    rng = np.random.default_rng(2)
-    quad = rng.normal(size=(4, 3)).astype(np.float32)
-    normals = rng.normal(size=(4, 3)).astype(np.float32)
-    colors = np.array([[255, 0, 1, 9], [1, 2, 3, 9], [4, 5, 6, 9], [7, 128, 9, 9]], np.uint8)
-    fields = [f"property float {k}" for k in ("x", "y", "z", "nx", "ny", "nz")]
-    fields += [f"property uchar {k}" for k in ("red", "green", "blue", "alpha")]
-    expected = (colors[:, :3].astype(np.float64) / 255).astype(np.float32)
-    for kind, order in (("ascii", "<"), ("binary_little_endian", "<"), ("binary_big_endian", ">")):
-        head = [
-            "ply",
-            f"format {kind} 1.0",
-            "comment Übung",
-            "comment TextureFile a.png",
-            "element vertex 4",
-            *fields,
-            "element face 1",
-            "property list uchar int vertex_indices",
-            "end_header\n",
-        ]
-        if kind == "ascii":
-            rows = [
-                " ".join(map(repr, [*map(float, p), *map(float, n), *map(int, c)]))
-                for p, n, c in zip(quad, normals, colors)
-            ]
-            body = "\n".join([*rows, "4 0 1 2 3", ""]).encode()
-        else:
-            body = b"".join(
-                np.concatenate([p, n]).astype(f"{order}f4").tobytes() + c.tobytes()
-                for p, n, c in zip(quad, normals, colors)
-            )
-            body += struct.pack(f"{order}B4i", 4, 0, 1, 2, 3)
-        path = tmp_path / f"{kind}.PLY"
-        path.write_bytes("\n".join(head).encode("latin-1") + body)
-        scene = load_mesh(path)
-        (primitive,) = scene.meshes[0].primitives
-        assert same_bits(primitive.positions, quad)
-        assert same_bits(primitive.normals, normals)
-        assert same_bits(primitive.colors, expected)
-        assert primitive.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
-        assert scene.materials == (Material(base_color=(1.0, 1.0, 1.0)),)
-        assert scene.notes == ("1 texture is not drawn yet: base colour factor used",)
-
-
-def test_ply_mixed_polygons(tmp_path):
-    text = PLY_HEAD.replace("vertex 3", "vertex 6").replace("face 1", "face 3")
-    text += "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n4 0 1 2 3\n3 0 1 4\n5 0 1 2 3 4\n"
-    (primitive,) = load_mesh(write(tmp_path / "a.ply", text)).meshes[0].primitives
-    assert sorted(primitive.faces.tolist()) == sorted(
-        [[0, 1, 2], [2, 3, 0], [0, 1, 4], [0, 1, 2], [0, 2, 3], [0, 3, 4]]
-    )
-
-
-def test_stl_binary_and_ascii(tmp_path):
-    rng = np.random.default_rng(4)
-    corners = rng.normal(size=(5, 3, 3)).astype(np.float32)
-    rows = b"".join(np.zeros(3, "<f4").tobytes() + c.tobytes() + b"\0\0" for c in corners)
-    path = tmp_path / "b.stl"
-    path.write_bytes(b"solid but binary".ljust(80) + struct.pack("<I", 5) + rows)
-    scene = load_mesh(path)
-    (primitive,) = scene.meshes[0].primitives
-    assert same_bits(primitive.positions[primitive.faces], corners)
-    assert primitive.normals is None
-    text = "".join(
-        f"solid s{k}\n"
-        + "".join(
-            "facet normal 0 0 1\nouter loop\n"
-            + "".join(f"vertex {float(x)!r} {float(y)!r} {float(z)!r}\n" for x, y, z in c)
-            + "endloop\nendfacet\n"
-            for c in part
-        )
-        + f"endsolid s{k}\n"
-        for k, part in enumerate((corners[:2], corners[2:]))
-    )
-    scene = load_mesh(write(tmp_path / "a.STL", text))
-    assert [n.name for n in scene.nodes] == ["s0", "s1"]
-    found = [m.primitives[0].positions[m.primitives[0].faces] for m in scene.meshes]
-    assert same_bits(np.concatenate(found), corners)
-
-
-# ------------------------------------------------------------------------ normals
+# ---------------------------------------------------------------------- scene.glb
 
 
 def split_cube() -> Primitive:
@@ -761,93 +442,6 @@ def split_cube() -> Primitive:
     positions = CUBE_CORNERS[np.array(CUBE_QUADS).ravel()]
     faces = [[4 * f, 4 * f + i, 4 * f + i + 1] for f in range(6) for i in (1, 2)]
     return Primitive(positions, faces, 0, np.full((24, 3), 0.25))
-
-
-def test_smooth_normals_of_a_cube(tmp_path):
-    """By symmetry a corner's three unit squares give (±1, ±1, ±1)/√3, but the diagonals weigh.
-
-    Area weighting makes the two triangles of a square count as often as they touch the corner, 1 or
-    2 times: the sum is (a, b, c) with entries 1 or 2 times 4, from each face's own diagonal.
-    """
-    primitive = split_cube()
-    scene = Scene((Mesh("cube", (primitive,)),), (Node("cube", 0),))
-    (smooth,) = with_normals(scene, "smooth").meshes[0].primitives
-    expected = np.zeros((24, 3))
-    for i, position in enumerate(primitive.positions):
-        for f, face in enumerate(primitive.faces):
-            touching = (primitive.positions[face] == position).all(axis=1).sum()
-            axis = np.cross(
-                *(
-                    CUBE_CORNERS[list(CUBE_QUADS[f // 2])][[1, 3]]
-                    - CUBE_CORNERS[CUBE_QUADS[f // 2][0]]
-                )
-            )
-            expected[i] += touching * axis
-    expected /= np.sqrt((expected**2).sum(axis=1))[:, None]
-    assert smooth.normals is not None
-    assert np.abs(smooth.normals - expected).max() < 1e-7
-    outward = np.sign(primitive.positions)
-    assert (np.sign(smooth.normals) == outward).all()
-    (flat,) = with_normals(scene, "flat").meshes[0].primitives
-    assert flat.normals is None
-    assert with_normals(scene, "authored") is scene
-
-
-def test_smooth_normals_join_primitives_and_signed_zeros_but_not_meshes(tmp_path):
-    # Two triangles that meet in an edge at a right angle, areas ½ and 2; −0 equals +0.
-    a = Primitive(np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
-    b = Primitive(np.float32([[-0.0, 0, 0], [-0.0, -0.0, 4], [1, 0, -0.0]]), [[0, 1, 2]])
-    nan = Primitive(np.float32([[0, 0, 0], [np.nan, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
-    lone = Mesh("lone", (a,))
-    scene = Scene((Mesh("pair", (a, b, nan)), lone), (Node("pair", 0), Node("lone", 1)))
-    scene = with_normals(scene, "smooth")
-    na, nb, nn = (p.normals for p in scene.meshes[0].primitives)
-    # (b − a) × (c − a): (0, 0, 1) and (0, 0, 4) × (1, 0, 0) = (0, 4, 0).
-    shared = np.float32([0, 4 / 17**0.5, 1 / 17**0.5])
-    assert same_bits(na, np.stack([shared, shared, np.float32([0, 0, 1])]))
-    assert same_bits(nb, np.stack([shared, np.float32([0, 1, 0]), shared]))
-    assert nn is not None
-    assert same_bits(nn[0], shared)
-    assert same_bits(nn[1], np.zeros(3, np.float32))  # NaN adds nothing and spoils nothing
-    assert same_bits(scene.meshes[1].primitives[0].normals, np.float32([[0, 0, 1]] * 3))
-
-
-def test_smooth_normals_compiled_equal_interpreted():
-    rng = np.random.default_rng(11)
-    positions = rng.normal(size=(50, 3)).astype(np.float32)
-    positions[7] = np.inf
-    faces = rng.integers(0, 50, (80, 3)).astype(np.int32)
-    group = meshes_module._position_groups(np.concatenate([positions[:25], positions[:25]]))
-    assert (group[:25] == group[25:]).all()
-    assert len(set(group.tolist())) == 25
-    out = np.empty((2, 50, 3), np.float32)
-    driver = meshes_module._smooth_normals
-    driver(positions, faces, group, np.zeros((50, 3)), out[0])
-    plain = getattr(driver.dispatcher, "py_func", driver.dispatcher)
-    with np.errstate(all="ignore"):
-        plain(positions, faces, group, np.zeros((50, 3)), out[1])
-    assert same_bits(out[0], out[1])
-    assert np.isfinite(out).all()
-
-
-def test_normals_option_on_files(tmp_path):
-    glb = one_triangle()
-    attributes = glb.root["meshes"][0]["primitives"][0]["attributes"]
-    authored = np.float32([[0, 1, 0], [0, 0.6, 0.8], [3, 4, 5]])
-    attributes["NORMAL"] = glb.add(authored)
-    path = glb.write(tmp_path / "a.glb")
-    for option, expected in (
-        ("authored", authored),
-        ("smooth", np.float32([[0, 0, 1]] * 3)),
-        ("flat", None),
-    ):
-        found = load_mesh(path, normals=option).meshes[0].primitives[0].normals
-        assert found is expected if expected is None else same_bits(found, expected)
-    with pytest.raises(SettingsError, match="'round'; expected one of authored, flat, smooth"):
-        load_mesh(tmp_path / "missing.glb", normals="round")
-
-
-# ---------------------------------------------------------------------- scene.glb
 
 
 def rich_scene() -> Scene:
@@ -985,7 +579,7 @@ def test_load_names_and_paths(tmp_path, monkeypatch):
     (tmp_path / "teapot").write_bytes(b"")
     assert load("teapot").nodes[0].name == "teapot None"  # a built-in name is never a file
     fails(Path("teapot"), "unknown extension", call=load)  # a Path always is
-    fails("teepot", "teapot, poles", ".glb, .gltf, .obj, .ply, .stl", call=load)
+    fails("teepot", "teapot, poles", ".glb, .gltf, .obj, .ply, .stl, .off, .3mf", call=load)
     fails("", "teapot, poles", call=load)
     fails("missing.obj", "no such file", call=load)
     with pytest.raises(SettingsError, match="tessellation"):

@@ -55,6 +55,9 @@ def global_options(
     json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object instead of text.")
     ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also print what was made of a mesh file.")
+    ] = False,
     threads: Annotated[
         int | None,
         typer.Option(metavar="N", help="Threads to compute with; the results are the same."),
@@ -65,7 +68,7 @@ def global_options(
     ] = False,
 ) -> None:
     """A reference for screen-space reflection: golden images, oracles and benchmarks."""
-    ctx.obj = Output(quiet=quiet, json=json)
+    ctx.obj = Output(quiet=quiet, json=json, verbose=verbose)
 
 
 def run(argv: Sequence[str]) -> int:

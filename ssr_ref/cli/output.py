@@ -13,10 +13,14 @@ from .progress import ProgressBar
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """The global options on output. quiet: no summary, no bar. json: one JSON object, no text."""
+    """The global options on output.
+
+    quiet: no summary, no bar. json: one JSON object, no text. verbose: a longer summary.
+    """
 
     quiet: bool = False
     json: bool = False
+    verbose: bool = False
 
     def progress(self) -> ProgressBar:
         """A bar on stderr; it shows nothing unless that is a terminal."""

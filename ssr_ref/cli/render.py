@@ -7,18 +7,19 @@ import re
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
 
 import typer
 
 from ..errors import CameraError, FileError, SceneError, SettingsError, SsrRefError, SsrRefWarning
+from .load_report import load_rows
 from .output import Output, length, percent
 
 if TYPE_CHECKING:
     from ..camera import Camera, View
-    from ..fileio.meshes import NormalsName
+    from ..fileio.options import NormalsName, UpName
     from ..pipeline import Frame
     from ..scene import Scene
     from ..settings import Settings
@@ -60,8 +61,24 @@ def render(
         bool, _option(_SCENE, "Add a mirror under the scene.", None, "--mirror-floor")
     ] = False,
     normals: Annotated[
-        str, _option(_SCENE, "Where shading normals come from.", "authored|flat|smooth")
+        str, _option(_SCENE, "Where shading normals come from.", "authored|flat|smooth|crease")
     ] = "authored",
+    up: Annotated[str, _option(_SCENE, "Upward axis of a mesh file.", "y|z")] = "y",
+    unit: Annotated[
+        str | None, _option(_SCENE, "What one unit of a mesh file is.", "mm|cm|m|inch|foot")
+    ] = None,
+    gltf_scene: Annotated[
+        str | None, _option(_SCENE, "Scene of a glTF file, by index or name.", "NAME", "--scene")
+    ] = None,
+    strict: Annotated[
+        bool, _option(_SCENE, "Refuse a file that is not drawn as it stands.", None, "--strict")
+    ] = False,
+    allow_outside: Annotated[
+        bool,
+        _option(
+            _SCENE, "Let a mesh file refer to files outside its folder.", None, "--allow-outside"
+        ),
+    ] = False,
     tessellation: Annotated[
         int | None, _option(_SCENE, "Fineness of a built-in scene.", "N")
     ] = None,
@@ -175,7 +192,12 @@ def render(
         progress("load", 0.0)
         loaded = load(
             scene,
-            normals=cast("NormalsName", normals),  # checked where it is used
+            normals=cast("NormalsName", normals),  # checked where they are used
+            up=cast("UpName", up),
+            unit=unit,
+            strict=strict,
+            allow_outside=allow_outside,
+            scene=parse_scene(gltf_scene),
             mirror_floor=mirror_floor,
             tessellation=tessellation,
         )
@@ -204,6 +226,11 @@ def parse_size(text: str) -> tuple[int, int]:
     if match is None:
         raise SettingsError(f"size is '{text}'; expected WIDTHxHEIGHT in pixels, such as 960x540")
     return int(match[1]), int(match[2])
+
+
+def parse_scene(text: str | None) -> int | str | None:
+    """A scene's index where the text is a whole number, else its name."""
+    return int(text) if text is not None and re.fullmatch(r"[0-9]{1,9}", text) else text
 
 
 def parse_color(text: str) -> tuple[float, float, float]:
@@ -296,6 +323,7 @@ def _report(out: Output, frame: Frame, output: Path, seconds: float) -> None:
             {
                 "output": str(output),
                 "scene": frame.scene.name,
+                "load": None if frame.scene.report is None else asdict(frame.scene.report),
                 "size": [width, height],
                 "pixels": counts["pixels"],
                 "rays": counts["rays"],
@@ -314,6 +342,7 @@ def _report(out: Output, frame: Frame, output: Path, seconds: float) -> None:
         [
             ("golden bundle", str(output)),
             ("scene", f"{frame.scene.name} ({frame.scene.triangle_count} triangles)"),
+            *(load_rows(frame.scene) if out.verbose else ()),
             ("size", f"{width}x{height}"),
             (
                 "lengths",

@@ -21,17 +21,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
+from .building import file_error
 from .options import LoadOptions
 
 _JSON_CHUNK = 0x4E4F534A
 _BIN_CHUNK = 0x004E4942
 _GREATEST = 2**53
 """No count, offset or length of a file that fits on a disk is larger."""
-
-
-def file_error(path: Path, message: str) -> FileError:
-    """A FileError of one line that starts with the file's path."""
-    return FileError(" ".join(f"{path}: {message}".split()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

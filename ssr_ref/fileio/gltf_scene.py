@@ -8,9 +8,10 @@ from pathlib import Path
 
 from ..errors import SceneError
 from ..scene import LoadReport, Mesh, Node, Scene
+from .building import file_error
 from .census import count_triangles
 from .gltf_accessors import DRACO, MESHOPT, QUANTIZATION, Accessors
-from .gltf_json import Gltf, file_error, read_gltf
+from .gltf_json import Gltf, read_gltf
 from .gltf_materials import DRAWN, Materials
 from .gltf_nodes import Walk, scene_index, scene_names, walk_scene
 from .gltf_primitives import Primitives

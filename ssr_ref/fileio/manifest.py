@@ -159,6 +159,7 @@ def build(frame: Frame, arrays: Mapping[str, AnyArray], files: Mapping[str, str]
             "content_sha256": frame.scene.content_sha256(),
             "triangles": int(frame.scene.triangle_count),
             "objects": len(frame.scene.nodes),
+            **({} if frame.scene.report is None else {"load": asdict(frame.scene.report)}),
         },
         "size": list(frame.settings.size),
         "camera": frame.camera.to_json(),

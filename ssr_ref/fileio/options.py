@@ -20,9 +20,11 @@ UNITS: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "f
 class LoadOptions:
     """Options of one load. Raises SettingsError for a value that is not listed.
 
-    normals : "authored" (what the file has; none: flat shading), "flat", "smooth" or "crease".
+    normals : "authored" (what the file has; without: glTF is flat, other formats as "crease"),
+        "crease" (sharp beyond 30°), "smooth" or "flat" whatever the file has.
     up : the file's upward axis; a scene is y up.
     unit : what one unit of the file is, "m", "cm", "mm", "inch" or "foot"; a scene is in metres.
+        None: what the file says (3MF does), else metres.
     strict : refuse a file of which anything is skipped, replaced or not drawn as it says.
     allow_outside : let a file refer to files outside its own folder.
     scene : of a glTF file with several, by index or name; None: its default.
@@ -30,7 +32,7 @@ class LoadOptions:
 
     normals: NormalsName = "authored"
     up: UpName = "y"
-    unit: str = "m"
+    unit: str | None = None
     strict: bool = False
     allow_outside: bool = False
     scene: int | str | None = None
@@ -38,7 +40,8 @@ class LoadOptions:
     def __post_init__(self) -> None:
         _choice("normals", self.normals, get_args(NormalsName))
         _choice("up", self.up, get_args(UpName))
-        _choice("unit", self.unit, tuple(UNITS))
+        if self.unit is not None:
+            _choice("unit", self.unit, tuple(UNITS))
         for name in ("strict", "allow_outside"):
             if not isinstance(getattr(self, name), bool):
                 raise SettingsError(f"{name} is {getattr(self, name)!r}; expected True or False")
