@@ -202,30 +202,38 @@ def driver(*, parallel: bool = True) -> Callable[[F], F]:
     return decorate
 
 
-def _fma_exact(a: float, b: float, c: float) -> float:
+def _fma_exact(a: Any, b: Any, c: Any) -> Any:
     """a·b + c rounded once, by exact rationals (for interpreted runs)."""
     from fractions import Fraction
 
+    single = all(isinstance(v, np.float32) for v in (a, b, c))
+    kind: Callable[[Any], Any] = np.float32 if single else float
     if not (np.isfinite(a) and np.isfinite(b) and np.isfinite(c)):
-        return a * b + c
+        return kind(a * b + c)
     exact = Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c))
     if exact == 0:
-        return float(np.float64(a) * np.float64(b) + np.float64(c))  # keeps the sign of zero
+        return kind(np.float64(a) * np.float64(b) + np.float64(c))  # keeps the sign of zero
     try:
-        return float(exact)
+        rounded = float(exact)
     except OverflowError:
-        return float(np.inf if exact > 0 else -np.inf)
+        return kind(np.inf if exact > 0 else -np.inf)
+    if single and Fraction(rounded) != exact and int(np.float64(rounded).view(np.int64)) % 2 == 0:
+        # Rounded twice, a number just beside a float32 tie would go the wrong way: an odd last
+        # bit is no tie.
+        rounded = float(np.nextafter(rounded, np.inf if exact > Fraction(rounded) else -np.inf))
+    return kind(rounded)
 
 
 if JIT_ENABLED:
 
     @intrinsic  # type: ignore[untyped-decorator]
     def fma(typingctx, a, b, c):  # type: ignore[no-untyped-def]
-        """Fused multiply-add: a·b + c rounded once, float64."""
-        signature = types.float64(types.float64, types.float64, types.float64)
+        """Fused multiply-add: a·b + c rounded once; float32 if all three are, else float64."""
+        kind = types.float32 if a == b == c == types.float32 else types.float64
+        signature = kind(kind, kind, kind)
 
         def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
-            cast = [context.cast(builder, v, t, types.float64) for v, t in zip(args, sig.args)]
+            cast = [context.cast(builder, v, t, kind) for v, t in zip(args, sig.args)]
             return builder.fma(*cast)
 
         return signature, codegen

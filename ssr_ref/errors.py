@@ -20,6 +20,10 @@ class SettingsError(SsrRefError):
     """A setting with an unknown name, a wrong type or a value out of range."""
 
 
+class MathsError(SsrRefError):
+    """An array that a formula cannot take: its shape, its type or a parameter out of range."""
+
+
 class FileError(SsrRefError):
     """A file that is missing, unreadable, of an unknown format, or that cannot be written."""
 

@@ -25,6 +25,7 @@ from .info import info
 from .output import Output
 from .render import render
 from .scenes import scenes
+from .vectors import vectors
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -38,6 +39,7 @@ app = typer.Typer(
 app.command()(render)
 app.command()(info)
 app.command()(scenes)
+app.command()(vectors)
 
 
 def _version(wanted: bool) -> None:

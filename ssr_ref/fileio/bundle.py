@@ -25,9 +25,10 @@ from ..errors import BundleError, FileError, SsrRefError
 from ..scene import Lights, Scene
 from ..settings import Settings
 from ..typed import AnyArray
+from . import folder as folders
 from . import manifest as contents
 from .exr import write_exr
-from .folder import check_can_create, disk_errors, whole_folder
+from .folder import MANIFEST_FILE, FolderKind, disk_errors, whole_folder
 from .npz import content_sha256, file_sha256, read_npz, write_npz
 
 if TYPE_CHECKING:
@@ -36,7 +37,8 @@ if TYPE_CHECKING:
 SCENE_FILE, PREVIEWS = "scene.glb", "previews"
 CAMERA_FILE, LIGHTS_FILE, SETTINGS_FILE = "camera.json", "lights.json", "settings.json"
 NPZ_FILE, EXR_FILE = "golden.npz", "golden.exr"
-MANIFEST_FILE, RUN_FILE = "manifest.json", "run.json"
+RUN_FILE = "run.json"
+_KIND = FolderKind("golden bundle", "bundle", contents.FORMAT, (MANIFEST_FILE, RUN_FILE))
 
 
 def write_bundle(
@@ -67,42 +69,7 @@ def write_bundle(
 
 def check_target(path: str | Path, *, force: bool = False) -> None:
     """Raise FileError unless a bundle can be written to `path`: before a render, not after it."""
-    target = Path(path)
-    with disk_errors(target):
-        if target.is_dir():
-            if not force:
-                raise FileError(
-                    f"output folder {target} exists; choose another folder, or --force "
-                    "(force=True) to replace a golden bundle"
-                )
-            _check_replaceable(target)
-        elif target.exists():
-            raise FileError(f"output {target} is a file; expected a folder that can be created")
-    check_can_create(target)
-
-
-def _check_replaceable(target: Path) -> None:
-    """Only what a bundle's own manifest names may be deleted."""
-    found = {p.relative_to(target).as_posix() for p in target.rglob("*") if not p.is_dir()}
-    if not found and not any(target.iterdir()):
-        return
-    try:
-        data = json.loads((target / MANIFEST_FILE).read_bytes())
-        known = set(data["files"])
-        ours = data["format"] == contents.FORMAT
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        known, ours = set(), False
-    if not ours:
-        raise FileError(
-            f"{target} is not a golden bundle and not empty; it is left as it is: choose another "
-            "folder"
-        )
-    strange = sorted(found - known - {MANIFEST_FILE, RUN_FILE})
-    if strange:
-        raise FileError(
-            f"{target} holds {strange[0]}, which is not the bundle's; it is left as it is: move "
-            "that file away or choose another folder"
-        )
+    folders.check_target(path, _KIND, force=force)
 
 
 def _write_files(frame: Frame, folder: Path, *, previews: bool, progress: Progress | None) -> None:

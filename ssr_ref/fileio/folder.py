@@ -7,17 +7,34 @@ replaced stays untouched until the new one is complete.
 from __future__ import annotations
 
 import errno
+import json
 import os
 import secrets
 import shutil
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import FileError, SsrRefWarning
 
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+MANIFEST_FILE = "manifest.json"
+
+
+@dataclass(frozen=True, slots=True)
+class FolderKind:
+    """A kind of folder that this package writes and may therefore replace.
+
+    noun, short : for messages. format : its manifest's "format". unlisted : files that may stand
+    beside those of the manifest's "files".
+    """
+
+    noun: str
+    short: str
+    format: str
+    unlisted: tuple[str, ...] = (MANIFEST_FILE,)
 
 
 @contextmanager
@@ -73,6 +90,46 @@ def _swap(temporary: Path, target: Path) -> None:
     if aside.exists():
         warnings.warn(
             f"the replaced bundle could not be removed; delete {aside}", SsrRefWarning, stacklevel=2
+        )
+
+
+def check_target(path: str | Path, kind: FolderKind, *, force: bool = False) -> None:
+    """Raise FileError unless a folder of this kind can be written: before the work, not after."""
+    target = Path(path)
+    with disk_errors(target):
+        if target.is_dir():
+            if not force:
+                raise FileError(
+                    f"output folder {target} exists; choose another folder, or --force "
+                    f"(force=True) to replace a {kind.noun}"
+                )
+            _check_replaceable(target, kind)
+        elif target.exists():
+            raise FileError(f"output {target} is a file; expected a folder that can be created")
+    check_can_create(target)
+
+
+def _check_replaceable(target: Path, kind: FolderKind) -> None:
+    """Only what a folder's own manifest names may be deleted."""
+    found = {p.relative_to(target).as_posix() for p in target.rglob("*") if not p.is_dir()}
+    if not found and not any(target.iterdir()):
+        return
+    try:
+        data = json.loads((target / MANIFEST_FILE).read_bytes())
+        known = set(data["files"])
+        ours = data["format"] == kind.format
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        known, ours = set(), False
+    if not ours:
+        raise FileError(
+            f"{target} is not a {kind.noun} and not empty; it is left as it is: choose another "
+            "folder"
+        )
+    strange = sorted(found - known - set(kind.unlisted))
+    if strange:
+        raise FileError(
+            f"{target} holds {strange[0]}, which is not the {kind.short}'s; it is left as it is: "
+            "move that file away or choose another folder"
         )
 
 

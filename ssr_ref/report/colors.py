@@ -13,6 +13,7 @@ import numpy as np
 
 from ..buffers import STATUS_OF_END, End, Status
 from ..typed import AnyArray, BoolArray, F64Array, U8Array
+from ..vecmath import srgb
 
 Rgb8 = tuple[int, int, int]
 """sRGB bytes."""
@@ -97,10 +98,13 @@ GREY = _ramp(((0, 0, 0), (255, 255, 255)))
 
 
 def srgb_encode(linear: AnyArray) -> F64Array:
-    """sRGB-encoded values 0 to 1 of linear ones (IEC 61966-2-1), clipped to [0, 1]; NaN stays."""
+    """sRGB-encoded values 0 to 1 of linear ones, clipped to [0, 1]; NaN stays.
+
+    The formula of `vecmath/srgb.py` with NumPy's power, which is many times as fast on an image.
+    """
     x = np.clip(np.asarray(linear, np.float64), 0.0, 1.0)
-    curve = 1.055 * np.power(x, 1.0 / 2.4) - 0.055
-    encoded: F64Array = np.where(x <= 0.0031308, 12.92 * x, curve)
+    curve = srgb.SCALE * np.power(x, 1.0 / srgb.EXPONENT) - srgb.OFFSET
+    encoded: F64Array = np.where(x <= srgb.LINEAR_THRESHOLD, srgb.SLOPE * x, curve)
     return encoded
 
 

@@ -95,6 +95,58 @@ def leaving_time(value: float, slope: float) -> float:
     return value / -slope if value > 0.0 else 0.0
 
 
+class Clip(NamedTuple):
+    """Where a ray leaves the visible space, in clip coordinates (x, y, w)."""
+
+    t: float  # length along the unit ray; may be inf
+    end: int  # `End`: the bound at t
+    depth: float  # view depth at t
+    start: Vec3  # clip coordinates at t = 0
+    slope: Vec3  # and how they change with t
+
+
+@kernel
+def clip_ray(view: ViewParams, origin: Vec3, r: Vec3, depth: float, max_distance: float) -> Clip:
+    """The bound that the unit ray from `origin` at view depth `depth` > 0 meets first.
+
+    Depth at the end is never below that of the origin and the near plane both, whatever t rounds
+    to: w stays above 0.
+    """
+    if view.perspective:
+        w, dw = depth, -r.z
+        cx = view.p00 * origin.x + view.offset_x * origin.z
+        cy = view.p11 * origin.y + view.offset_y * origin.z
+        dx = view.p00 * r.x + view.offset_x * r.z
+        dy = view.p11 * r.y + view.offset_y * r.z
+    else:
+        w, dw = 1.0, 0.0
+        cx = view.p00 * origin.x + view.offset_x
+        cy = view.p11 * origin.y + view.offset_y
+        dx = view.p00 * r.x
+        dy = view.p11 * r.y
+    t, end = leaving_time(w + cx, dw + dx), LEFT_SCREEN_L
+    t_next = leaving_time(w - cx, dw - dx)
+    if t_next < t:
+        t, end = t_next, LEFT_SCREEN_R
+    t_next = leaving_time(w - cy, dw - dy)
+    if t_next < t:
+        t, end = t_next, LEFT_SCREEN_T
+    t_next = leaving_time(w + cy, dw + dy)
+    if t_next < t:
+        t, end = t_next, LEFT_SCREEN_B
+    t_next = leaving_time(depth - view.near, -r.z)
+    if t_next < t:
+        t, end = t_next, BEHIND_CAMERA
+    if max_distance < t or np.isinf(t):
+        t, end = max_distance, MAX_DISTANCE
+
+    depth1 = view.near if end == BEHIND_CAMERA else depth - t * r.z
+    lowest = min(depth, view.near)
+    if depth1 < lowest:
+        depth1 = lowest
+    return Clip(t, end, depth1, Vec3(cx, cy, w), Vec3(dx, dy, dw))
+
+
 @kernel
 def no_ray(status: int) -> tuple[int, Ray]:
     """A status that needs no walk, with an empty ray."""
@@ -135,37 +187,13 @@ def set_up_ray(
     if not dot(r, geo_normal) > 0.0:
         return no_ray(BELOW_SURFACE)
 
-    # Find the bound that is met first, in clip space: x, y and w of origin and direction.
-    if view.perspective:
-        w, dw = depth, -r.z
-        cx = view.p00 * origin.x + view.offset_x * origin.z
-        cy = view.p11 * origin.y + view.offset_y * origin.z
-        dx = view.p00 * r.x + view.offset_x * r.z
-        dy = view.p11 * r.y + view.offset_y * r.z
-    else:
-        w, dw = 1.0, 0.0
-        cx = view.p00 * origin.x + view.offset_x
-        cy = view.p11 * origin.y + view.offset_y
-        dx = view.p00 * r.x
-        dy = view.p11 * r.y
-    t, end = leaving_time(w + cx, dw + dx), LEFT_SCREEN_L
-    t_next = leaving_time(w - cx, dw - dx)
-    if t_next < t:
-        t, end = t_next, LEFT_SCREEN_R
-    t_next = leaving_time(w - cy, dw - dy)
-    if t_next < t:
-        t, end = t_next, LEFT_SCREEN_T
-    t_next = leaving_time(w + cy, dw + dy)
-    if t_next < t:
-        t, end = t_next, LEFT_SCREEN_B
-    t_next = leaving_time(depth - view.near, -r.z)
-    if t_next < t:
-        t, end = t_next, BEHIND_CAMERA
-    if max_distance < t or np.isinf(t):
-        t, end = max_distance, MAX_DISTANCE
+    # Clip it; c and d are the clip coordinates of origin and direction.
+    clip = clip_ray(view, origin, r, depth, max_distance)
+    t, end, depth1 = clip.t, clip.end, clip.depth
+    cx, cy = clip.start.x, clip.start.y
+    dx, dy, dw = clip.slope.x, clip.slope.y, clip.slope.z
 
     # Project the end: in the limit of an endless ray, the window of its direction.
-    depth1 = view.near if end == BEHIND_CAMERA else depth - t * r.z
     k0 = 1.0 / depth
     if view.perspective:
         if np.isinf(t):

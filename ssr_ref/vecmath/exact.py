@@ -27,6 +27,13 @@ def two_sum(a: float, b: float) -> Pair:
 
 
 @kernel
+def two_prod(a: float, b: float) -> Pair:
+    """a·b exactly, unless it overflows or its error term underflows (|a·b| < 2**-969)."""
+    p = a * b
+    return Pair(p, fma(a, b, -p))
+
+
+@kernel
 def two_difference(a: float, b: float) -> Pair:
     """a − b exactly."""
     return two_sum(a, -b)
@@ -53,6 +60,23 @@ def multiply_pairs(a: Pair, b: Pair) -> Pair:
     product = a.hi * b.hi
     error = fma(a.hi, b.hi, -product) + (a.hi * b.lo + a.lo * b.hi)
     return two_sum(product, error)
+
+
+@kernel
+def divide_pairs(a: Pair, b: Pair) -> Pair:
+    """a / b, one step of long division after the leading quotient."""
+    quotient = a.hi / b.hi
+    rest = fma(-quotient, b.hi, a.hi) + (a.lo - quotient * b.lo)
+    return two_sum(quotient, rest / b.hi)
+
+
+@kernel
+def dot_twice(a: Vec3, b: Vec3) -> Pair:
+    """a·b as if summed in twice the precision: off by u² · 10 Σ|aᵢbᵢ| (Ogita, Rump, Oishi 2005)."""
+    x, y, z = two_prod(a.x, b.x), two_prod(a.y, b.y), two_prod(a.z, b.z)
+    first = two_sum(x.hi, y.hi)
+    second = two_sum(first.hi, z.hi)
+    return two_sum(second.hi, second.lo + (first.lo + (x.lo + (y.lo + z.lo))))
 
 
 class PairVec3(NamedTuple):
