@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ssr_ref.fileio.meshes import load_mesh
 from ssr_ref.fileio.scene_glb import write_scene_glb
+from ssr_ref.meshfiles.meshes import load_mesh
 from ssr_ref.scene import Mesh, Node, Primitive, Scene
 
 from .common import machine, median_ms

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ssr_ref.fileio.images import png_bytes
+from ssr_ref.meshfiles.images import png_bytes
 from ssr_ref.texture import Image
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from ssr_ref.errors import FileError
-from ssr_ref.fileio.images import png_bytes
-from ssr_ref.fileio.meshes import load_mesh
-from ssr_ref.fileio.options import LoadOptions
+from ssr_ref.meshfiles.images import png_bytes
+from ssr_ref.meshfiles.meshes import load_mesh
+from ssr_ref.meshfiles.options import LoadOptions
 from ssr_ref.scene import Primitive, Scene
 from ssr_ref.texture import Image
 

@@ -34,6 +34,7 @@ LAYERS = [
     ["pipeline"],
     ["study"],
     ["report"],
+    ["meshfiles"],
     ["fileio"],
     ["cli"],
     ["__main__"],

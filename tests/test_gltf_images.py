@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from PIL import Image as PillowImage
 
 from ssr_ref.errors import FileError, SettingsError
-from ssr_ref.fileio import beside as beside_module
-from ssr_ref.fileio import images
-from ssr_ref.fileio.beside import read_beside
-from ssr_ref.fileio.images import png_bytes, read_image
-from ssr_ref.fileio.options import LoadOptions, check_strict
+from ssr_ref.meshfiles import beside as beside_module
+from ssr_ref.meshfiles import images
+from ssr_ref.meshfiles.beside import read_beside
+from ssr_ref.meshfiles.images import png_bytes, read_image
+from ssr_ref.meshfiles.options import LoadOptions, check_strict
 from ssr_ref.scene import LoadReport
 from ssr_ref.texture import Image
 

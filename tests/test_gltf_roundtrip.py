@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from ssr_ref.errors import FileError
 from ssr_ref.fileio import scene_glb
-from ssr_ref.fileio.gltf_scene import load_gltf
-from ssr_ref.fileio.options import LoadOptions
 from ssr_ref.fileio.scene_glb import scene_glb_bytes
+from ssr_ref.meshfiles.gltf_scene import load_gltf
+from ssr_ref.meshfiles.options import LoadOptions
 from ssr_ref.scene import Material, Mesh, Node, Primitive, Scene
 from ssr_ref.texture import Image, Texture
 

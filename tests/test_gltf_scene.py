@@ -15,10 +15,10 @@ from glb_file import TRIANGLE, Glb, one_triangle, with_png
 from PIL import Image as PillowImage
 
 from ssr_ref.errors import FileError
-from ssr_ref.fileio.gltf_accessors import as_float32
-from ssr_ref.fileio.gltf_scene import load_gltf
-from ssr_ref.fileio.images import png_bytes
-from ssr_ref.fileio.options import LoadOptions
+from ssr_ref.meshfiles.gltf_accessors import as_float32
+from ssr_ref.meshfiles.gltf_scene import load_gltf
+from ssr_ref.meshfiles.images import png_bytes
+from ssr_ref.meshfiles.options import LoadOptions
 from ssr_ref.scene import Material, Primitive, Scene
 from ssr_ref.texture import Image, Texture
 

@@ -15,9 +15,9 @@ import pytest
 from glb_file import Glb, one_triangle, with_png
 
 from ssr_ref.errors import FileError
-from ssr_ref.fileio import gltf_accessors, gltf_textures
-from ssr_ref.fileio.gltf_scene import load_gltf
-from ssr_ref.fileio.options import LoadOptions
+from ssr_ref.meshfiles import gltf_accessors, gltf_textures
+from ssr_ref.meshfiles.gltf_scene import load_gltf
+from ssr_ref.meshfiles.options import LoadOptions
 
 
 def fails(data: bytes, *words: str, path: str = "m.glb") -> None:

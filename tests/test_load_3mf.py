@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from mesh_files import corners, fails, only, same_bits
 
-from ssr_ref.fileio import threemf
-from ssr_ref.fileio.meshes import load_mesh
-from ssr_ref.fileio.options import LoadOptions
+from ssr_ref.meshfiles import threemf
+from ssr_ref.meshfiles.meshes import load_mesh
+from ssr_ref.meshfiles.options import LoadOptions
 
 CORE = 'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"'
 MESH = (

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mesh_files import fails, only, same_bits, strict, write, write_image
 
-from ssr_ref.fileio.meshes import load_mesh
-from ssr_ref.fileio.options import LoadOptions
+from ssr_ref.meshfiles.meshes import load_mesh
+from ssr_ref.meshfiles.options import LoadOptions
 from ssr_ref.scene import Material, Scene
 from ssr_ref.texture import Texture
 

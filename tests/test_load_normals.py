@@ -9,9 +9,9 @@ import pytest
 from mesh_files import only, same_bits, write
 
 from ssr_ref.errors import SettingsError
-from ssr_ref.fileio import normals as normals_module
-from ssr_ref.fileio.meshes import load_mesh, with_normals
-from ssr_ref.fileio.options import LoadOptions
+from ssr_ref.meshfiles import normals as normals_module
+from ssr_ref.meshfiles.meshes import load_mesh, with_normals
+from ssr_ref.meshfiles.options import LoadOptions
 from ssr_ref.scene import Mesh, Node, Primitive, Scene
 from ssr_ref.scenes import shapes
 

@@ -9,7 +9,7 @@ import pytest
 from mesh_files import corners, fails, only, same_bits, strict, write
 
 from ssr_ref.errors import FileError
-from ssr_ref.fileio.meshes import load_mesh
+from ssr_ref.meshfiles.meshes import load_mesh
 from ssr_ref.scene import Material
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

@@ -15,10 +15,10 @@ import ssr_ref
 from ssr_ref import transforms
 from ssr_ref.__main__ import main
 from ssr_ref.errors import SettingsError
-from ssr_ref.fileio import meshes
 from ssr_ref.fileio.load import load
-from ssr_ref.fileio.meshes import FORMATS, load_mesh
-from ssr_ref.fileio.options import LoadOptions
+from ssr_ref.meshfiles import meshes
+from ssr_ref.meshfiles.meshes import FORMATS, load_mesh
+from ssr_ref.meshfiles.options import LoadOptions
 from ssr_ref.scene import LoadReport, Scene
 
 OBJ = "v 0.1 0.2 0.3\nv 1 0 7\nv 0 1 0\nf 1 2 3\n"
@@ -137,7 +137,7 @@ def test_a_bad_file_is_silent_and_unchanged(tmp_path, capfd, caplog, recwarn):
 
 
 def test_very_many_parts_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("ssr_ref.fileio.building.MAX_PARTS", 3)
+    monkeypatch.setattr("ssr_ref.meshfiles.building.MAX_PARTS", 3)
     objects = "".join(f"o {i}\nf 1 2 3\n" for i in range(4))
     fails(write(tmp_path / "a.obj", OBJ + objects), "over 3 parts")
     solid = "solid {}\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"

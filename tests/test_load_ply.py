@@ -12,8 +12,8 @@ import pytest
 from mesh_files import corners, fails, only, ply_header, same_bits, strict, write_image
 
 from ssr_ref.errors import FileError
-from ssr_ref.fileio.colors import linear_from_codes
-from ssr_ref.fileio.meshes import load_mesh
+from ssr_ref.meshfiles.colors import linear_from_codes
+from ssr_ref.meshfiles.meshes import load_mesh
 from ssr_ref.scene import Material
 from ssr_ref.texture import Texture
 

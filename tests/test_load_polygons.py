@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mesh_files import corners, only, write
 
-from ssr_ref.fileio.meshes import load_mesh
-from ssr_ref.fileio.polygons import triangulate
+from ssr_ref.meshfiles.meshes import load_mesh
+from ssr_ref.meshfiles.polygons import triangulate
 
 U = [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)]  # 3 × 3 less 1 × 2: area 7
 ARROW = [(0, 0), (2, 1), (0, 2), (0.5, 1)]  # 2 less a triangle of ½: area 1.5

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mesh_files import binary_stl, corners, fails, only, same_bits, strict, write
 
-from ssr_ref.fileio.meshes import load_mesh
+from ssr_ref.meshfiles.meshes import load_mesh
 from ssr_ref.scene import Material
 
 TRIANGLES = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0.5], [0, 1, 0]]]

@@ -25,8 +25,8 @@ import ssr_ref
 from ssr_ref import transforms
 from ssr_ref.errors import FileError, SettingsError
 from ssr_ref.fileio.load import load
-from ssr_ref.fileio.meshes import load_mesh
 from ssr_ref.fileio.scene_glb import scene_glb_bytes, write_scene_glb
+from ssr_ref.meshfiles.meshes import load_mesh
 from ssr_ref.scene import Lights, Material, Mesh, Node, Primitive, Scene
 
 CUBE_CORNERS = np.array(
@@ -592,7 +592,7 @@ def test_trimesh_is_imported_only_when_needed(tmp_path):
     """A GLB needs no trimesh, and importing the loader reads nothing."""
     path = one_triangle().write(tmp_path / "a.glb")
     code = (
-        "import sys, ssr_ref, ssr_ref.fileio.load, ssr_ref.fileio.meshes as m;"
+        "import sys, ssr_ref, ssr_ref.fileio.load, ssr_ref.meshfiles.meshes as m;"
         f"m.load_mesh({str(path)!r}); print('trimesh' in sys.modules)"
     )
     root = Path(ssr_ref.__file__).parents[1]

@@ -19,7 +19,7 @@ from .output import Output, length, percent
 
 if TYPE_CHECKING:
     from ..camera import Camera, View
-    from ..fileio.options import NormalsName, UpName
+    from ..meshfiles.options import NormalsName, UpName
     from ..pipeline import Frame
     from ..scene import Scene
     from ..settings import Settings

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import FileError, SettingsError
+from ..meshfiles.meshes import FORMATS, load_mesh, with_normals
+from ..meshfiles.options import LoadOptions, NormalsName, UpName
 from ..scene import Scene
-from .meshes import FORMATS, load_mesh, with_normals
-from .options import LoadOptions, NormalsName, UpName
 
 
 def load(

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
+from ..meshfiles.gltf_materials import ALPHA_KEY, EMISSIVE_KEY, REFLECTIVITY_KEY, UNLIT_KEY
+from ..meshfiles.gltf_primitives import COLOR_KEY, TRIANGLES
+from ..meshfiles.images import png_bytes
 from ..scene import Material, Mesh, Primitive, Scene
 from ..texture import Texture, WrapName
 from ..typed import AnyArray, F32Array
-from .gltf_materials import ALPHA_KEY, EMISSIVE_KEY, REFLECTIVITY_KEY, UNLIT_KEY
-from .gltf_primitives import COLOR_KEY, TRIANGLES
-from .images import png_bytes
 
 _ARRAY_BUFFER = 34962
 _ELEMENT_ARRAY_BUFFER = 34963

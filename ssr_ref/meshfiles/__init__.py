@@ -1,0 +1,1 @@
+"""Mesh files to scenes: one reader a format, and what they share."""
