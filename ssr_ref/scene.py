@@ -389,11 +389,17 @@ def _check_transform(node: Node) -> None:
             f"node '{node.name}' has the last row {m[3].tolist()}; expected [0, 0, 0, 1]: only "
             "affine transforms place a mesh"
         )
+    # Scaled by a power of two, exactly, so that products of huge or tiny entries stay in range.
+    exponent = int(np.frexp(np.abs(m[:3, :3]).max())[1])
+    a = m.copy()
+    a[:3, :3] = np.ldexp(m[:3, :3], -exponent)
     columns = 1.0
     for j in range(3):
-        columns *= float(np.sqrt(m[0, j] * m[0, j] + m[1, j] * m[1, j] + m[2, j] * m[2, j]))
-    det = transforms.determinant3(m)
+        columns *= float(np.sqrt(a[0, j] * a[0, j] + a[1, j] * a[1, j] + a[2, j] * a[2, j]))
+    det = transforms.determinant3(a)
     if not abs(det) > SINGULAR * columns:
+        with np.errstate(over="ignore"):
+            det = float(np.ldexp(det, 3 * exponent))
         raise SceneError(
             f"node '{node.name}' has a singular transform (determinant {det:.3g}); expected one "
             "that keeps volume: remove the zero scale"

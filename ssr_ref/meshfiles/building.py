@@ -29,9 +29,28 @@ MAX_NOTES = 8
 """Notes on one kind of finding; the report has them all."""
 
 
+MAX_LINE = 800
+"""Characters of one message or note; the middle of a longer one is left out."""
+
+
+def one_line(text: str) -> str:
+    """Text that may hold a file's own words as one line that is safe to print in a terminal.
+
+    Line breaks become spaces; control characters, text direction marks and halves of surrogate
+    pairs become escapes such as \\x1b.
+    """
+    text = " ".join(text.split())
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    if len(text) <= MAX_LINE:
+        return text
+    half = (MAX_LINE - 5) // 2
+    return f"{text[:half]} ... {text[-half:]}"
+
+
 def file_error(path: Path, message: str) -> FileError:
     """A FileError of one line that starts with the file's path."""
-    return FileError(" ".join(f"{path}: {message}".split()))
+    return FileError(one_line(f"{path}: {message}"))
 
 
 def without_path(path: Path, error: Exception) -> str:
@@ -100,7 +119,7 @@ class Part(NamedTuple):
 
 def float32(values: AnyArray) -> F32Array:
     """Rounded once; what is beyond float32 becomes infinite, and then is not drawn."""
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # invalid: a signalling NaN becomes quiet
         return np.asarray(values).astype(np.float32)
 
 

@@ -126,11 +126,10 @@ def read_gltf(path: Path, data: bytes, options: LoadOptions) -> Gltf:
     """
     text, binary = _chunks(path, data) if data[:4] == b"glTF" else (memoryview(data), None)
     try:
-        root = json.loads(
-            bytes(text).strip(b"\x00").decode("utf-8-sig"),
-            parse_constant=_no_constant,
-            object_pairs_hook=_unique,
-        )
+        words = bytes(text).strip(b"\x00").decode("utf-8-sig")
+        root = json.loads(words, parse_constant=_no_constant, object_pairs_hook=_unique)
+        if "\\ud" in words or "\\uD" in words:  # an escaped half of a surrogate pair is no text
+            json.dumps(root, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise file_error(
             path,

@@ -27,6 +27,9 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _MOST_INFLATED = 1032
 """DEFLATE makes at most 1032 bytes of one (258 bytes for 2 bits)."""
 
+_SLOW_TEXELS, _SLOW_TEXELS_PER_BYTE = 2**22, 64
+"""Texels that pypng may make (2 µs each): this, and so many times the bytes of the file."""
+
 _STORED = 65535
 """Most bytes of one stored DEFLATE block (RFC 1951, section 3.2.4)."""
 
@@ -75,8 +78,39 @@ def _read_png(name: str, data: bytes) -> AnyArray:
             "a whole PNG file: it is cut short, export it again",
         )
     if depth == 16 or (color == 0 and depth < 8):
+        if width * height > _SLOW_TEXELS + _SLOW_TEXELS_PER_BYTE * len(data):
+            raise image_error(
+                name,
+                f"has {width} × {height} texels of {depth} bits in {len(data)} bytes",
+                "8 bits where so much is packed: convert it",
+            )
+        _check_unpacked(name, data, width, height)
         return _through_pypng(name, data)
     return _through_pillow(name, data, "PNG")
+
+
+def _check_unpacked(name: str, data: bytes, width: int, height: int) -> None:
+    """Raise FileError if the pixel data unpack to more than the header says: pypng unpacks all.
+
+    The bound holds for 4 channels of 16 bits, and for the filter bytes of interlaced rows too.
+    """
+    left = 8 * width * height + 2 * (2 * height + 8)
+    stream = zlib.decompressobj()
+    at = len(SIGNATURE)
+    try:
+        while at + 8 <= len(data):
+            size = int.from_bytes(data[at : at + 4], "big")
+            if data[at + 4 : at + 8] == b"IDAT":
+                left -= len(stream.decompress(data[at + 8 : at + 8 + size], left + 1))
+            if left < 0:
+                raise image_error(
+                    name,
+                    f"cannot be read as PNG (it unpacks to more than {width} × {height} texels)",
+                    "a valid PNG file: export it again",
+                )
+            at += 12 + size
+    except zlib.error:
+        pass  # pypng says what is damaged
 
 
 def _through_pypng(name: str, data: bytes) -> AnyArray:

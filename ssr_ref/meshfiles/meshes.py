@@ -15,7 +15,7 @@ from typing import get_args
 from .. import transforms
 from ..errors import FileError, SceneError, SettingsError
 from ..scene import Scene
-from .building import file_error
+from .building import file_error, one_line
 from .gltf_scene import load_gltf
 from .normals import with_crease_normals, with_smooth_normals, without_normals
 from .obj import load_obj
@@ -56,13 +56,29 @@ def load_mesh(path: str | Path, options: LoadOptions = _DEFAULTS) -> Scene:
         scene = _with_normals_of_file(scene, options.normals, flat_if_missing=suffix in _GLTF)
         scene = _placed(scene, options)
         scene.world_bounds()  # raises where no vertex is finite
+        if scene.report is not None:
+            check_strict(path, scene.report, options)
+    except FileError as error:
+        raise FileError(one_line(str(error))) from None
     except SceneError as error:
         raise file_error(path, str(error)) from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise _unreadable(path, error) from None
-    if scene.report is not None:
-        check_strict(path, scene.report, options)
-    return scene
+    return _with_clean_words(scene)
+
+
+def _with_clean_words(scene: Scene) -> Scene:
+    """The scene with notes and a report that are safe to print, whatever names the file holds."""
+    report = scene.report
+    if report is not None:
+        report = replace(
+            report,
+            skipped=tuple(map(one_line, report.skipped)),
+            fallbacks=tuple(map(one_line, report.fallbacks)),
+            unsupported=tuple(map(one_line, report.unsupported)),
+            textures=tuple((one_line(name), w, h) for name, w, h in report.textures),
+        )
+    return replace(scene, notes=tuple(map(one_line, scene.notes)), report=report)
 
 
 def with_normals(scene: Scene, normals: NormalsName) -> Scene:

@@ -110,7 +110,8 @@ def _columns(element: Element, names: tuple[tuple[str, ...], ...]) -> AnyArray |
     """(rows, k) of the first set of properties that the element has in full."""
     for wanted in names:
         if all(name in element.scalars for name in wanted):
-            return np.stack([element.scalars[name] for name in wanted], axis=1)
+            with np.errstate(invalid="ignore"):  # of mixed types, a signalling NaN becomes quiet
+                return np.stack([element.scalars[name] for name in wanted], axis=1)
     return None
 
 
