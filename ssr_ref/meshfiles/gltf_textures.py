@@ -15,7 +15,7 @@ from ..errors import FileError
 from ..texture import Image, Texture, WrapName
 from .gltf_accessors import Accessors
 from .gltf_json import Gltf
-from .images import read_image
+from .images import NoRoomError, read_image
 
 _WRAPS: dict[Any, WrapName] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 _NEAREST = 9728
@@ -23,7 +23,7 @@ _NEAREST = 9728
 _PLAIN_SOURCES = ("EXT_texture_webp",)
 _OTHER_SOURCES = ("KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif")
 
-_BUDGET, _BUDGET_PER_BYTE = 2**30, 64
+_BUDGET, _BUDGET_PER_BYTE = 2**28, 64
 """Bytes of decoded images at most: this, and so many times the bytes that they are decoded from."""
 
 _MAX_ROTATION = 2.0**20
@@ -133,17 +133,15 @@ class Textures:
                 raise self._problem(error) from None
         else:
             raise self._gltf.error(f"images[{index}] has no data; expected a uri: export again")
+        self._encoded += len(data)
+        room = _BUDGET + _BUDGET_PER_BYTE * self._encoded - self._decoded
         try:
-            image = read_image(name, data)
+            image = read_image(name, data, room=room)
+        except NoRoomError as error:
+            raise self._gltf.error(str(error)) from None
         except FileError as error:
             raise self._problem(error) from None
-        self._encoded += len(data)
         self._decoded += image.pixels.nbytes
-        budget = _BUDGET + _BUDGET_PER_BYTE * self._encoded
-        if self._decoded > budget:
-            raise self._gltf.error(
-                f"its images hold {self._decoded} bytes; expected at most {budget}: scale them down"
-            )
         self.images.append(image)
         return len(self.images) - 1
 

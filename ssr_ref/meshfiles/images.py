@@ -34,20 +34,25 @@ _STORED = 65535
 """Most bytes of one stored DEFLATE block (RFC 1951, section 3.2.4)."""
 
 
-def read_image(name: str, data: bytes) -> Image:
+class NoRoomError(FileError):
+    """An image whose pixels would take more memory than there is room for."""
+
+
+def read_image(name: str, data: bytes, *, room: int | None = None) -> Image:
     """The image of a PNG, JPEG or WebP file; its kind is decided by its first bytes.
 
     name : of the image, used in errors too. Pixels are (H, W, 4), uint16 for 16-bit PNG, uint8
     otherwise; alpha is the greatest code where the file has none. Raises FileError (one line) for
-    another format, damaged, truncated or animated data, CMYK, or a size over `texture`'s limits.
+    another format, damaged, truncated or animated data, CMYK, or a size over `texture`'s limits;
+    NoRoomError, before anything is decoded, if its pixels take more than `room` bytes.
     """
     if data.startswith(SIGNATURE):
-        pixels = _read_png(name, data)
+        pixels = _read_png(name, data, room)
     elif data.startswith(b"\xff\xd8\xff"):
-        pixels = _through_pillow(name, data, "JPEG")
+        pixels = _through_pillow(name, data, "JPEG", room)
     elif data[:4] == b"RIFF" and data[8:12] == b"WEBP":
         _check_webp(name, data)
-        pixels = _through_pillow(name, data, "WEBP")
+        pixels = _through_pillow(name, data, "WEBP", room)
     else:
         raise image_error(
             name,
@@ -62,7 +67,15 @@ def image_error(name: str, found: str, expected: str) -> FileError:
     return FileError(" ".join(f"image '{name}' {found}; expected {expected}".split()))
 
 
-def _read_png(name: str, data: bytes) -> AnyArray:
+def _check_room(name: str, width: int, height: int, texel: int, room: int | None) -> None:
+    if room is not None and width * height * texel > room:
+        raise NoRoomError(
+            f"image '{name}' takes {width * height * texel} bytes; expected at most {max(room, 0)} "
+            "more: scale the images down"
+        )
+
+
+def _read_png(name: str, data: bytes, room: int | None) -> AnyArray:
     """Check the header, then decode by the library that gets this kind right."""
     if len(data) < 33 or data[12:16] != b"IHDR":
         raise image_error(name, "has no PNG header", "a valid PNG file: export it again")
@@ -71,6 +84,7 @@ def _read_png(name: str, data: bytes) -> AnyArray:
         check_image_size(name, width, height)
     except SceneError as error:
         raise FileError(" ".join(str(error).split())) from None
+    _check_room(name, width, height, 8 if depth == 16 else 4, room)
     if width * height * depth > 8 * _MOST_INFLATED * len(data):
         raise image_error(
             name,
@@ -86,7 +100,7 @@ def _read_png(name: str, data: bytes) -> AnyArray:
             )
         _check_unpacked(name, data, width, height)
         return _through_pypng(name, data)
-    return _through_pillow(name, data, "PNG")
+    return _through_pillow(name, data, "PNG", room)
 
 
 def _check_unpacked(name: str, data: bytes, width: int, height: int) -> None:
@@ -137,7 +151,7 @@ def _through_pypng(name: str, data: bytes) -> AnyArray:
     return pixels
 
 
-def _through_pillow(name: str, data: bytes, kind: str) -> AnyArray:
+def _through_pillow(name: str, data: bytes, kind: str, room: int | None) -> AnyArray:
     from PIL import Image as PillowImage
 
     try:
@@ -148,6 +162,7 @@ def _through_pillow(name: str, data: bytes, kind: str) -> AnyArray:
                     file.verify()  # the chunks' checksums, which decoding alone passes over
             with PillowImage.open(io.BytesIO(data), formats=(kind,)) as file:
                 check_image_size(name, *file.size)
+                _check_room(name, *file.size, 4, room)
                 # The second picture of a stereo JPEG is no animation: the first is the image.
                 if kind != "JPEG" and getattr(file, "is_animated", False):
                     raise image_error(name, "is animated", "a still image: export one frame")

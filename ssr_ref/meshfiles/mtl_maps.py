@@ -18,7 +18,6 @@ from ..errors import FileError
 from ..texture import Image, Texture, WrapName
 from ..typed import AnyArray
 from .beside import read_beside
-from .building import file_error
 from .images import read_image
 from .options import LoadOptions
 
@@ -122,19 +121,14 @@ class MapImages:
         if reference not in self._numbers:
             try:
                 data = read_beside(self._path, reference, self._options)
-                self._numbers[reference] = self._add(read_image(reference, data))
+                room = MAX_IMAGE_BYTES - self._bytes
+                self._numbers[reference] = self._add(read_image(reference, data, room=room))
             except FileError as error:
                 self._errors[reference] = error
                 raise
         return self._numbers[reference]
 
     def _add(self, image: Image) -> int:
-        if self._bytes + image.pixels.nbytes > MAX_IMAGE_BYTES:
-            raise file_error(
-                self._path,
-                f"has with {image.name!r} images of over {MAX_IMAGE_BYTES} bytes; expected fewer: "
-                "scale them down",
-            )
         self._bytes += image.pixels.nbytes
         self.images.append(image)
         return len(self.images) - 1
