@@ -85,6 +85,7 @@ class GBuffer:
     geo_normal_vs (H, W, 3): unit, faces the eye. normal_vs (H, W, 3): unit shading normal.
     Both are 0 where nothing was drawn.
     albedo, reflectivity (H, W, 3): linear RGB. roughness (H, W). radiance (H, W, 3): linear RGB.
+    thickness (H, W): of the solid behind the pixel, scene units, if each material has its own.
     """
 
     depth: FloatArray
@@ -98,6 +99,7 @@ class GBuffer:
     reflectivity: FloatArray | None = None
     roughness: FloatArray | None = None
     radiance: FloatArray | None = None
+    thickness: FloatArray | None = None
     counts: RasterCounts = field(default_factory=RasterCounts)
 
     def arrays(self) -> dict[str, AnyArray]:
@@ -114,6 +116,8 @@ class HitBuffer:
     hit_depth (H, W): view depth. residual (H, W): hit_depth − front, 0 to the thickness.
     length (H, W): distance along the ray from the surface.
     steps, fetches (H, W) uint32: samples tested; depth and back-depth reads.
+    fade_px, fade_length: what the fades of a published listing are taken at instead of hit_px and
+    length; fade_px may lie outside the image. Only with `Settings.listing`.
     """
 
     status: U8Array
@@ -125,9 +129,11 @@ class HitBuffer:
     length: F64Array
     steps: U32Array
     fetches: U32Array
+    fade_px: F64Array | None = None
+    fade_length: F64Array | None = None
 
     def arrays(self) -> dict[str, AnyArray]:
-        """The buffers by name."""
+        """The buffers that exist, by name."""
         return _arrays(self)
 
 
@@ -135,7 +141,8 @@ class HitBuffer:
 class Resolved:
     """The reflection's colour and how sure it is, float32, linear RGB.
 
-    edge_fade, distance_fade, confidence (H, W): 0 to 1, 0 where there is no hit.
+    edge_fade, distance_fade, confidence (H, W): 0 to 1, 0 where there is no hit; with
+    `Settings.listing` edge_fade and confidence may be below 0.
     reflection (H, W, 3): c·L_hit + (1 − c)·F, before the surface's R, 0 where no ray was asked for.
     composite (H, W, 3): L·(1 − R) + R·reflection.
     """

@@ -8,13 +8,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .analytic.arrays import MaterialArrays, material_arrays
+from .analytic.gbuffer import OUTPUTS, analytic_gbuffer
+from .analytic.scene import AnalyticScene
 from .buffers import GBuffer, HitBuffer, Resolved
 from .camera import Camera, View, ViewParams
 from .raster.geometry import Geometry, flatten
 from .raster.rasterize import RasterOptions, rasterize, visible_textures
 from .raster.textures import TextureStore, texture_store
 from .scene import Scene
-from .scenes import framed_view
+from .scenes import framed_view, view_of_bounds
 from .settings import NEAR_PER_RADIUS, Settings
 from .shading.diffuse import light_arrays, shade_radiance
 from .ssr.resolve import resolve
@@ -31,7 +34,7 @@ class Frame:
     settings are resolved: no length is None. warnings: one line each. timings: seconds a stage.
     """
 
-    scene: Scene
+    scene: Scene | AnalyticScene
     camera: Camera
     settings: Settings
     gbuffer: GBuffer
@@ -42,7 +45,7 @@ class Frame:
 
 
 def render(
-    scene: Scene,
+    scene: Scene | AnalyticScene,
     camera: Camera | View | None = None,
     settings: Settings | None = None,
     *,
@@ -50,6 +53,7 @@ def render(
 ) -> Frame:
     """Rasterize a scene, trace its reflections, composite.
 
+    A closed-form scene is not rasterized: its rays are cast (`analytic.analytic_gbuffer`).
     camera: a `Camera`, or a `View` that becomes one; None: the scene's own view, or one framed on
     its bounds. settings: None: the defaults. progress: called with stage and share done.
     Raises SceneError, CameraError or SettingsError.
@@ -62,12 +66,21 @@ def render(
         settings = settings.resolved(radius)
         camera = make_camera(scene, camera, settings, radius)
         view = camera.params(settings.size)
-        geometry = flatten(scene)
-        store = texture_store(scene)
-    with stages("raster"):
-        gbuffer, positions_vs = rasterize(view, geometry, raster_options(settings), store=store)
-    with stages("radiance"):
-        gbuffer = with_radiance(view, geometry, positions_vs, gbuffer, scene, store)
+        materials: Geometry | MaterialArrays
+        if isinstance(scene, Scene):
+            materials = geometry = flatten(scene)
+            store = texture_store(scene)
+        else:
+            materials = material_arrays(scene.materials)
+    if isinstance(scene, Scene):
+        with stages("raster"):
+            gbuffer, positions_vs = rasterize(view, geometry, raster_options(settings), store=store)
+        with stages("radiance"):
+            gbuffer = with_radiance(view, geometry, positions_vs, gbuffer, scene, store)
+    else:
+        with stages("raster"):
+            gbuffer = cast_gbuffer(scene, camera, settings)
+    gbuffer = with_thickness(gbuffer, scene, settings)
     with stages("trace"):
         hits = trace(view, gbuffer, settings, stages.within("trace"))
     with stages("resolve"):
@@ -79,18 +92,22 @@ def render(
         gbuffer=gbuffer,
         hits=hits,
         resolved=resolved,
-        warnings=(*scene.notes, *frame_warnings(scene, geometry, gbuffer, settings)),
+        warnings=(*scene.notes, *frame_warnings(scene, materials, gbuffer, settings)),
         timings=stages.seconds,
     )
 
 
 def make_camera(
-    scene: Scene, camera: Camera | View | None, settings: Settings, radius: float
+    scene: Scene | AnalyticScene, camera: Camera | View | None, settings: Settings, radius: float
 ) -> Camera:
     """The camera to use; a view's missing near plane is 2⁻¹⁰ of the scene's radius."""
     if isinstance(camera, Camera):
         return camera
-    view = camera or scene.view or framed_view(scene)
+    view = camera or scene.view
+    if view is None and isinstance(scene, Scene):
+        view = framed_view(scene)
+    elif view is None:
+        view = view_of_bounds(*scene.world_bounds())
     return view.camera(settings.size, NEAR_PER_RADIUS * radius)
 
 
@@ -103,6 +120,21 @@ def raster_options(settings: Settings) -> RasterOptions:
         max_roughness=settings.max_roughness,
         gpu_vertices=settings.snap == "gpu_vertices",
         dtype=np.float64 if settings.buffer_dtype == "float64" else np.float32,
+    )
+
+
+def cast_gbuffer(scene: AnalyticScene, camera: Camera, settings: Settings) -> GBuffer:
+    """The closed-form G-buffer that these settings ask for."""
+    options = raster_options(settings)
+    return analytic_gbuffer(
+        scene,
+        camera,
+        settings.size,
+        dtype=options.dtype,
+        outputs=[n for n in OUTPUTS if n != "back_depth" or options.back_depth],
+        back_any_object=options.back_any_object,
+        fresnel=options.fresnel,
+        max_roughness=options.max_roughness,
     )
 
 
@@ -128,15 +160,29 @@ def with_radiance(
     return replace(gbuffer, radiance=radiance)
 
 
+def with_thickness(gbuffer: GBuffer, scene: Scene | AnalyticScene, settings: Settings) -> GBuffer:
+    """The G-buffer with each pixel's own thickness, if the settings ask for it."""
+    if settings.thickness_from != "material":
+        return gbuffer
+    assert gbuffer.material_id is not None
+    own = [settings.thickness if m.thickness is None else m.thickness for m in scene.materials]
+    table = np.array([*own, 0.0], gbuffer.depth.dtype)  # −1, nothing drawn, is the last
+    return replace(gbuffer, thickness=table[gbuffer.material_id])
+
+
 def frame_warnings(
-    scene: Scene, geometry: Geometry, gbuffer: GBuffer, settings: Settings
+    scene: Scene | AnalyticScene,
+    materials: Geometry | MaterialArrays,
+    gbuffer: GBuffer,
+    settings: Settings,
 ) -> list[str]:
     """What the reader of a valid picture must still know."""
     lines: list[str] = []
     counts = gbuffer.counts
     seen = gbuffer.triangle_id >= 0
     if not seen.any():
-        lines.append("the view is empty: no triangle covers a pixel centre")
+        what = "triangle" if isinstance(scene, Scene) else "shape"
+        lines.append(f"the view is empty: no {what} covers a pixel centre")
     if counts.non_finite:
         lines.append(
             f"{counts.non_finite} of {counts.triangles} triangles have NaN or infinite vertices "
@@ -149,13 +195,13 @@ def frame_warnings(
         )
     if seen.any() and gbuffer.material_id is not None:
         visible = np.unique(gbuffer.material_id[seen])
-        reflective = geometry.metallic[visible] > 0.0
-        reflective |= np.nan_to_num(geometry.own_reflectivity[visible]).max(axis=1) > 0.0
+        reflective = materials.metallic[visible] > 0.0
+        reflective |= np.nan_to_num(materials.own_reflectivity[visible]).max(axis=1) > 0.0
         # A metallic-roughness map speaks for each pixel; its factors alone mean nothing.
         mapped = [m.metallic_roughness_texture is not None for m in scene.materials]
         reflective &= ~np.array(mapped, bool)[visible]
-        rough = reflective & (geometry.roughness[visible] > settings.max_roughness)
-        blurred = reflective & ~rough & (geometry.roughness[visible] > 0.0)
+        rough = reflective & (materials.roughness[visible] > settings.max_roughness)
+        blurred = reflective & ~rough & (materials.roughness[visible] > 0.0)
         if rough.any():
             lines.append(
                 f"{int(rough.sum())} visible materials are rougher than max_roughness "

@@ -41,7 +41,8 @@ class Material:
     Textures multiply their factors: base colour and emission by the decoded sRGB image, alpha by
     the image's alpha, roughness by green and metallic by blue of the linear one.
     alpha_cutoff: where alpha (factor · texture · vertex) is below it nothing is drawn; None:
-    opaque, whatever the alpha. unlit: radiance is the base colour.
+    opaque, whatever the alpha. unlit: radiance is the base colour. thickness: of the solid behind a
+    pixel for `thickness_from = "material"`, scene units, may be inf; None: the setting's.
     """
 
     name: str = "material"
@@ -57,6 +58,7 @@ class Material:
     base_color_texture: Texture | None = None
     metallic_roughness_texture: Texture | None = None
     emissive_texture: Texture | None = None
+    thickness: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("base_color", "emissive", "reflectivity"):
@@ -73,6 +75,12 @@ class Material:
                     "or more"
                 )
             object.__setattr__(self, name, number)
+        if self.thickness is not None:
+            if not float(self.thickness) >= 0.0:
+                raise SceneError(
+                    f"material '{self.name}' has thickness {self.thickness:g}; expected 0 or more"
+                )
+            object.__setattr__(self, "thickness", float(self.thickness))
         object.__setattr__(self, "double_sided", bool(self.double_sided))
         object.__setattr__(self, "unlit", bool(self.unlit))
 
@@ -323,16 +331,7 @@ class Scene:
 
     def radius(self) -> float:
         """Half the diagonal of the world bounds, rounded to a power of two (nearest in log)."""
-        low, high = self.world_bounds()
-        d = high / 2 - low / 2
-        largest = float(d.max())
-        if largest == 0.0:
-            return 1.0
-        d = d / largest
-        r = largest * float(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
-        mantissa, exponent = np.frexp(r)
-        power = int(exponent) if mantissa * mantissa >= 0.5 else int(exponent) - 1
-        return float(np.ldexp(1.0, power))
+        return radius_of_bounds(*self.world_bounds())
 
     def with_lights(self, lights: Lights) -> Scene:
         """The same scene under other lights."""
@@ -370,12 +369,27 @@ class Scene:
         extra = [material.alpha, material.alpha_cutoff, material.unlit]
         if extra != [1.0, None, False]:
             digest.update(json.dumps(extra).encode())
+        if material.thickness is not None:
+            digest.update(f"thickness {material.thickness.hex()}".encode())
         for slot, texture in enumerate(material.textures):
             if texture is not None:
                 pixels = self.images[texture.image].pixels
                 reading = asdict(texture) | {"image": [slot, pixels.dtype.str, *pixels.shape]}
                 digest.update(json.dumps(reading, sort_keys=True).encode())
                 digest.update(pixels.astype(pixels.dtype.newbyteorder("<")).tobytes())
+
+
+def radius_of_bounds(low: F64Array, high: F64Array) -> float:
+    """Half the diagonal of bounds, rounded to a power of two (nearest in log); 1 for a point."""
+    d = high / 2 - low / 2
+    largest = float(d.max())
+    if largest == 0.0:
+        return 1.0
+    d = d / largest
+    r = largest * float(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
+    mantissa, exponent = np.frexp(r)
+    power = int(exponent) if mantissa * mantissa >= 0.5 else int(exponent) - 1
+    return float(np.ldexp(1.0, power))
 
 
 def _check_transform(node: Node) -> None:

@@ -1,7 +1,7 @@
 """Everything a user may tune, range-checked here and nowhere else.
 
 Lengths left at None are derived from the scene's radius r (a power of two): thickness 2⁻⁶ r,
-max_distance 4 r. `Settings.resolved` fills them in; the result is what a bundle records.
+max_distance 4 r, step 2⁻⁷ r. `Settings.resolved` fills them in; a bundle records the result.
 """
 
 from __future__ import annotations
@@ -15,10 +15,12 @@ from .camera import check_size
 from .errors import SettingsError
 from .typed import Rgb, Size
 
-TracerName = Literal["dda", "cells"]
-ThicknessSource = Literal["back_faces", "constant"]
-IntervalName = Literal["column", "cell"]
-RefineName = Literal["auto", "rewalk", "none"]
+TracerName = Literal["dda", "cells", "march"]
+ThicknessSource = Literal["back_faces", "constant", "relative", "slope", "material"]
+SurfaceName = Literal["constant", "plane"]
+IntervalName = Literal["column", "cell", "point", "published"]
+RefineName = Literal["auto", "rewalk", "bisect", "secant", "none"]
+GrowthName = Literal["linear", "constant"]
 SelfRejection = Literal["plane", "none"]
 DistanceFade = Literal["none", "published", "linear"]
 FallbackName = Literal["none", "constant"]
@@ -28,6 +30,9 @@ BufferDtype = Literal["float32", "float64"]
 THICKNESS_PER_RADIUS = 2.0**-6
 NEAR_PER_RADIUS = 2.0**-10
 MAX_DISTANCE_PER_RADIUS = 4.0
+STEP_PER_RADIUS = 2.0**-7
+MAX_SAMPLES = 2**24
+"""Of a 3-D march without max_steps, on the way to max_distance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,20 +40,37 @@ class Settings:
     """Settings of one render. Raises SettingsError for a value out of range.
 
     size : (W, H) pixels, 1 to 16384 each.
-    tracer : "dda" (one sample a stride) or "cells" (every pixel the ray crosses).
+    tracer : "dda" (one sample a stride), "cells" (every pixel the ray crosses) or "march" (samples
+        along the ray in 3-D).
+    surface : a pixel's surface is one depth ("constant", as GPU code reads it) or the plane through
+        its surface point ("plane"; bias, interval and refine then have no meaning).
     stride : whole pixels of the major axis between samples, 1 to 1024; DDA only.
-    jitter : start offset j in (0, 1] of a stride from a per-pixel hash; off: j = 1.
+    jitter : start offset j in (0, 1] of a stride from a per-pixel hash; off: j = 1. The march's
+        noise is the same number.
+    step : of the march, scene units, above 0; None: 2⁻⁷ r.
+    growth : the march's increments: "linear" (i + j)·step for i = 0, 1, …; "constant" j·step, then
+        step.
     seed : of the jitter's hash, 0 to 2³²−1.
     max_steps : samples tested at most; None: no limit.
     max_distance : length of a ray in scene units, above 0, may be inf; None: 4 r.
     bias : added to the front of the slab, scene units, ≥ 0.
     thickness : of the slab where there is no back face, scene units, ≥ 0, may be inf; None: r/64.
-    thickness_from : "back_faces" (the same object's back face) or "constant".
+    thickness_from : "back_faces" (the same object's back face; constant where there is none),
+        "constant", "relative" (thickness is a share of the front depth), "slope" (the constant plus
+        the depth range that the surface spans inside its pixel), or "material" (each material's
+        own, the constant where it has none).
     back_any_object : the back face of any object, as a GPU's back-face buffer holds it.
-    interval : "column" (half a stride either side) or "cell" (clamped to the pixel read).
-    refine : "rewalk" every cell of a candidate's interval, "none"; "auto": rewalk above stride 1.
+    interval : "column" (half a stride either side), "cell" (clamped to the pixel read), "point"
+        (the sample alone), or "published" (column, but the first from the origin: self-hits).
+    refine : "rewalk" every cell of a candidate's interval, "bisect" it, "none"; "auto": rewalk
+        above stride 1. Of the march: "bisect" between the last two samples, "secant" a secant step
+        after it, "none"; "auto": bisect.
+    refine_steps : halvings of the march's refinement, 0 to 64.
+    listing : the march as published, with its slips (docs/errata_tracers.md); needs max_steps.
     self_rejection : "plane" refuses hits under the origin's tangent plane; "none".
-    edge_fade : whether confidence falls towards the image's border; edge_power its exponent.
+    facing_test : refuse a candidate whose geometric normal the ray does not go against.
+    edge_fade : whether confidence falls towards the image's border; edge_power its exponent, above
+        0; None: 2 for the march, else 3.
     distance_fade : "none", "published" 0.75^(length/max) or "linear".
     fresnel : Schlick's term, with f0 = 0.04 for dielectrics.
     fallback : what a miss shows: "none" (0) or "constant" (fallback_color, linear RGB).
@@ -59,9 +81,12 @@ class Settings:
 
     size: Size = (960, 540)
     tracer: TracerName = "dda"
+    surface: SurfaceName = "constant"
     stride: int = 1
     jitter: bool = False
     seed: int = 0
+    step: float | None = None
+    growth: GrowthName = "linear"
     max_steps: int | None = None
     max_distance: float | None = None
     bias: float = 0.0
@@ -70,9 +95,12 @@ class Settings:
     back_any_object: bool = False
     interval: IntervalName = "column"
     refine: RefineName = "auto"
+    refine_steps: int = 8
+    listing: bool = False
     self_rejection: SelfRejection = "plane"
+    facing_test: bool = False
     edge_fade: bool = True
-    edge_power: float = 3.0
+    edge_power: float | None = None
     distance_fade: DistanceFade = "none"
     fresnel: bool = False
     fallback: FallbackName = "none"
@@ -86,9 +114,11 @@ class Settings:
         _check_choices(self)
         _whole(self, "stride", 1, 1024)
         _whole(self, "seed", 0, 2**32 - 1)
+        _whole(self, "refine_steps", 0, 64)
         if self.max_steps is not None:
             _whole(self, "max_steps", 1, 2**31 - 1)
         _number(self, "max_distance", above=0.0, inf=True)
+        _number(self, "step", above=0.0)
         _number(self, "bias", least=0.0)
         _number(self, "thickness", least=0.0, inf=True)
         _number(self, "edge_power", above=0.0)
@@ -100,18 +130,33 @@ class Settings:
                 "below 0"
             )
         object.__setattr__(self, "fallback_color", color)
+        _check_tracer(self)
 
     @property
-    def refines(self) -> bool:
-        """Whether candidates are re-walked cell by cell."""
-        return self.tracer == "dda" and (
-            self.refine == "rewalk" or (self.refine == "auto" and self.stride > 1)
-        )
+    def refinement(self) -> RefineName:
+        """What a candidate leads to, "auto" resolved."""
+        if self.refine != "auto":
+            return self.refine
+        if self.tracer == "march":
+            return "bisect"
+        return "rewalk" if self.stride > 1 else "none"
+
+    @property
+    def tracer_edge_power(self) -> float:
+        """edge_power that goes with the tracer where none is given."""
+        return 2.0 if self.tracer == "march" else 3.0
+
+    @property
+    def edge_exponent(self) -> float:
+        """edge_power, or the tracer's own where it is None."""
+        return self.tracer_edge_power if self.edge_power is None else self.edge_power
 
     def resolved(self, radius: float) -> Settings:
-        """The same settings with every default length filled in from the scene's radius."""
+        """The same settings with every default filled in, lengths from the scene's radius."""
         return replace(
             self,
+            step=STEP_PER_RADIUS * radius if self.step is None else self.step,
+            edge_power=self.edge_exponent,
             thickness=THICKNESS_PER_RADIUS * radius if self.thickness is None else self.thickness,
             max_distance=(
                 MAX_DISTANCE_PER_RADIUS * radius if self.max_distance is None else self.max_distance
@@ -145,16 +190,20 @@ class Settings:
 
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "tracer": get_args(TracerName),
+    "surface": get_args(SurfaceName),
     "thickness_from": get_args(ThicknessSource),
     "interval": get_args(IntervalName),
     "refine": get_args(RefineName),
+    "growth": get_args(GrowthName),
     "self_rejection": get_args(SelfRejection),
     "distance_fade": get_args(DistanceFade),
     "fallback": get_args(FallbackName),
     "snap": get_args(SnapName),
     "buffer_dtype": get_args(BufferDtype),
     "jitter": (True, False),
+    "listing": (True, False),
     "back_any_object": (True, False),
+    "facing_test": (True, False),
     "edge_fade": (True, False),
     "fresnel": (True, False),
 }
@@ -166,6 +215,50 @@ def _check_choices(settings: Settings) -> None:
         if value not in choices or (isinstance(choices[0], bool) and not isinstance(value, bool)):
             listed = ", ".join(str(c) for c in choices)
             raise SettingsError(f"{name} is {value!r}; expected one of {listed}")
+
+
+_REFINES: dict[str, tuple[str, ...]] = {
+    "dda": ("auto", "rewalk", "bisect", "none"),
+    "cells": get_args(RefineName),  # has nothing to refine
+    "march": ("auto", "bisect", "secant", "none"),
+}
+
+
+def _check_tracer(settings: Settings) -> None:
+    """What one tracer has and another has not."""
+    tracer = settings.tracer
+    if settings.refine not in _REFINES[tracer]:
+        listed = ", ".join(_REFINES[tracer])
+        raise SettingsError(
+            f"refine is '{settings.refine}'; expected one of {listed} with tracer '{tracer}'"
+        )
+    if settings.listing and (tracer != "march" or settings.max_steps is None):
+        raise SettingsError(
+            f"listing is True with tracer '{tracer}' and max_steps {settings.max_steps}; expected "
+            "tracer 'march' and a max_steps: nothing else ends the published loop"
+        )
+    if settings.listing and settings.refine == "secant":
+        raise SettingsError("refine is 'secant' with listing; expected auto, bisect or none")
+    if tracer != "march":
+        return
+    if settings.surface != "constant":
+        raise SettingsError(
+            f"surface is '{settings.surface}' with tracer 'march'; expected 'constant'"
+        )
+    far, step = settings.max_distance, settings.step
+    if settings.max_steps is not None or far is None:
+        return
+    samples = np.inf if np.isinf(far) else 0.0
+    if step is not None:
+        samples = far / step
+        if settings.growth == "linear":
+            samples = float(np.sqrt(2.0 * samples))
+    if samples > MAX_SAMPLES:
+        raise SettingsError(
+            f"max_distance {far:g} takes the march more than {MAX_SAMPLES} samples of step "
+            f"{'2^-7 r' if step is None else format(step, 'g')}; expected fewer: set max_steps, a "
+            "longer step or a shorter max_distance"
+        )
 
 
 def _whole(settings: Settings, name: str, low: int, high: int) -> None:

@@ -30,6 +30,7 @@ LAYERS = [
     ["shading"],
     ["depth"],
     ["ssr"],
+    ["analytic"],
     ["maths"],
     ["pipeline"],
     ["study"],
@@ -42,7 +43,7 @@ LAYERS = [
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 CORE = {"errors", "typed", "_jit", "vecmath", "transforms", "camera", "texture", "scene"}
 CORE |= {"settings"}
-CORE |= {"buffers", "scenes", "raster", "shading", "depth", "ssr", "maths", "pipeline"}
+CORE |= {"buffers", "scenes", "raster", "shading", "depth", "ssr", "analytic", "maths", "pipeline"}
 OUTSIDE_CORE = {"imageio", "trimesh", "typer", "rich", "OpenEXR", "PIL", "matplotlib"}
 
 

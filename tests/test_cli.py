@@ -223,7 +223,8 @@ def test_every_setting_can_be_given(folder, rendered):
     line = (
         "render triangle.obj -o out --size 5x3 --tracer cells --stride 3 --jitter --seed 7 "
         "--max-steps 99 --max-distance 2.5 --bias 0.25 --thickness 0.5 --thickness-from constant "
-        "--back-any-object --interval cell --refine none --self-rejection none --no-edge-fade "
+        "--back-any-object --surface plane --facing-test --interval cell --refine none "
+        "--self-rejection none --no-edge-fade "
         "--edge-power 2 --distance-fade linear --fresnel --fallback-color 0.1,0.2,0.3 "
         "--max-roughness 0.75 --snap gpu_vertices --buffer-dtype float64 --no-previews"
     )
@@ -231,13 +232,24 @@ def test_every_setting_can_be_given(folder, rendered):
     assert rendered[0][2] == Settings(
         size=(5, 3), tracer="cells", stride=3, jitter=True, seed=7, max_steps=99,
         max_distance=2.5, bias=0.25, thickness=0.5, thickness_from="constant",
-        back_any_object=True, interval="cell", refine="none", self_rejection="none",
+        back_any_object=True, surface="plane", facing_test=True, interval="cell",
+        refine="none", self_rejection="none",
         edge_fade=False, edge_power=2.0, distance_fade="linear", fresnel=True,
         fallback="constant", fallback_color=(0.1, 0.2, 0.3), max_roughness=0.75,
         snap="gpu_vertices", buffer_dtype="float64",
     )  # fmt: skip
-    differing = [n for n, v in Settings().to_json().items() if v == rendered[0][2].to_json()[n]]
-    assert differing == []  # every setting was given a value that is not its default
+    line = (
+        "render triangle.obj -o two --size 5x3 --tracer march --step 0.125 --growth constant "
+        "--max-steps 9 --refine bisect --refine-steps 5 --listing --no-previews"
+    )
+    assert run_line(line) == 0
+    assert rendered[1][2] == Settings(
+        size=(5, 3), tracer="march", step=0.125, growth="constant", max_steps=9,
+        refine="bisect", refine_steps=5, listing=True,
+    )  # fmt: skip
+    given = [made[2].to_json() for made in rendered]
+    same = [n for n, v in Settings().to_json().items() if all(made[n] == v for made in given)]
+    assert same == []  # every setting was given a value that is not its default
 
 
 def test_scene_options_reach_the_loader(folder, rendered, monkeypatch):

@@ -96,6 +96,11 @@ INTERPRETED = [
     {"interval": "cell", "fresnel": True, "distance_fade": "published", "edge_power": 2.5},
     {"buffer_dtype": "float64", "back_any_object": True},
     {"snap": "gpu_vertices", "max_steps": 3},
+    pytest.param({"tracer": "march", "jitter": True, "refine": "secant"}, marks=pytest.mark.slow),
+    pytest.param(
+        {"tracer": "march", "listing": True, "max_steps": 12, "distance_fade": "published"},
+        marks=pytest.mark.slow,
+    ),
 ]
 
 

@@ -66,9 +66,13 @@ def rows(text: str, heading: str) -> list[list[str]]:
     return found
 
 
+def python_blocks(name: str) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", page(name), re.DOTALL)
+
+
 def listings(name: str, first: str) -> Space:
     """Run a page's Python listings, from the one that holds `first` on, in one namespace."""
-    blocks = re.findall(r"```python\n(.*?)```", page(name), re.DOTALL)
+    blocks = python_blocks(name)
     start = next(i for i, block in enumerate(blocks) if first in block)
     space: Space = {"fma": _fma_exact, "f32": lambda x: float(np.float32(x)), "power": power}
     space |= {n: getattr(math, n) for n in ("inf", "isfinite", "isinf", "nextafter", "sqrt")}
@@ -138,8 +142,14 @@ def trace_by_listing(space: Space, frame: Frame) -> list[list[Any]]:
         reflectivity=g.reflectivity.tolist(),
         back=g.back_depth.tolist() if from_back_faces and g.back_depth is not None else None,
     )
-    front = space["prepare_targets"](view, buffers.depth, buffers.geo_normal)
     values = listing_settings(frame)
+    if chosen.surface == "plane":
+        planes = space["prepare_planes"](view, buffers, values.thickness)
+        return [
+            [space["trace_planes"](view, buffers, planes, values, x, y) for x in range(view.width)]
+            for y in range(view.height)
+        ]
+    front = space["prepare_targets"](view, buffers.depth, buffers.geo_normal)
     return [
         [space["trace_pixel"](view, buffers, front, values, x, y) for x in range(view.width)]
         for y in range(view.height)
@@ -147,22 +157,31 @@ def trace_by_listing(space: Space, frame: Frame) -> list[list[Any]]:
 
 
 def listing_settings(frame: Frame) -> SimpleNamespace:
-    chosen = frame.settings
+    chosen, thickness = frame.settings, frame.gbuffer.thickness
     return SimpleNamespace(
         tracer=chosen.tracer,
         stride=chosen.stride,
+        step=chosen.step,
+        growth=chosen.growth,
+        refine_steps=chosen.refine_steps,
         jitter=chosen.jitter,
         seed=chosen.seed,
-        refine=chosen.refines,
-        cell_interval=chosen.interval == "cell",
+        refine=chosen.refinement,
+        interval=chosen.interval,
         max_steps=math.inf if chosen.max_steps is None else chosen.max_steps,
         max_distance=chosen.max_distance,
         thickness=chosen.thickness,
         bias=chosen.bias,
         rounding=2.0**-53 if frame.gbuffer.depth.dtype == np.float64 else 2.0**-24,
         reject_self=chosen.self_rejection == "plane",
+        facing_test=chosen.facing_test,
+        model=chosen.thickness_from,
+        most=chosen.thickness if chosen.thickness_from in FRONT_PLUS_CONSTANT else math.inf,
+        thickness_of=None if thickness is None else thickness.tolist(),
     )
 
+
+FRONT_PLUS_CONSTANT = ("constant", "back_faces")
 
 ORTHOGRAPHIC = View((0.8, 1.2, 3.75), (0.08, 0.2, 0.0), orthographic_height=2.6, far=5.0)
 INSIDE = View((0.3, 0.4, 0.5), (0.08, 0.2, 0.0), fov_y_degrees=100.0, near=0.3)
@@ -177,6 +196,17 @@ TRACES: list[tuple[View | None, dict[str, Any]]] = [
     (INSIDE, {"max_distance": 0.4, "refine": "rewalk"}),
     (ORTHOGRAPHIC, {"stride": 2}),
     (ORTHOGRAPHIC, {"tracer": "cells", "max_distance": math.inf}),
+    (None, {"interval": "point", "facing_test": True, "thickness_from": "slope"}),
+    (None, {"interval": "published", "thickness_from": "relative", "thickness": 0.01}),
+    (SHIFTED, {"stride": 5, "refine": "bisect", "jitter": True, "thickness_from": "material"}),
+    (ORTHOGRAPHIC, {"stride": 7, "refine": "bisect", "thickness_from": "slope"}),
+    (None, {"surface": "plane"}),
+    (None, {"surface": "plane", "tracer": "cells", "max_steps": 9}),
+    (SHIFTED, {"surface": "plane", "stride": 4, "jitter": True}),
+    (INSIDE, {"surface": "plane", "thickness_from": "constant", "max_distance": 0.4}),
+    (ORTHOGRAPHIC, {"surface": "plane", "jitter": True, "max_distance": math.inf}),
+    (ORTHOGRAPHIC, {"surface": "plane", "tracer": "cells"}),
+    (ORTHOGRAPHIC, {"surface": "plane", "stride": 3, "self_rejection": "none"}),
 ]
 
 
@@ -184,16 +214,46 @@ TRACES: list[tuple[View | None, dict[str, Any]]] = [
 def test_the_listing_of_the_tracer_gives_the_same_bytes(
     view: View | None, options: dict[str, Any]
 ) -> None:
-    frame = ssr_ref.render(build("teapot", 3), view, Settings(size=(37, 23), **options))
+    scene = build("teapot", 3)
+    materials = tuple(
+        replace(m, thickness=(None, 0.25, math.inf)[i % 3]) for i, m in enumerate(scene.materials)
+    )
+    settings = Settings(size=(37, 23), **options)
+    frame = ssr_ref.render(replace(scene, materials=materials), view, settings)
     assert (frame.hits.status == Status.HIT).sum() > 10
     check_trace(frame)
 
 
-def check_trace(frame: Frame) -> None:
-    traced = trace_by_listing(listings("dda.md", "def trace_pixel"), frame)
+def check_trace(frame: Frame, space: Space | None = None) -> None:
+    if space is None:
+        space = listings("dda.md", "def trace_pixel")
+        exec("\n".join(re.findall(r"```python\n(.*?)```", page("planes.md"), re.DOTALL)), space)
+    traced = trace_by_listing(space, frame)
     for name, expected in frame.hits.arrays().items():
         got = np.array([[getattr(out, name) for out in row] for row in traced], expected.dtype)
         assert got.tobytes() == expected.tobytes(), name
+
+
+MARCHES: list[tuple[View | None, dict[str, Any]]] = [
+    (None, {"jitter": True, "seed": 4}),
+    (SHIFTED, {"growth": "constant", "refine": "secant", "refine_steps": 3, "bias": 0.01}),
+    (ORTHOGRAPHIC, {"thickness_from": "constant", "jitter": True, "refine": "none"}),
+    (INSIDE, {"max_distance": math.inf, "max_steps": 12, "refine": "secant", "step": 0.02}),
+]
+
+
+@pytest.mark.parametrize(("view", "options"), MARCHES)
+def test_the_listing_of_the_march_gives_the_same_bytes(
+    view: View | None, options: dict[str, Any]
+) -> None:
+    settings = Settings(size=(37, 23), tracer="march", **options)
+    frame = ssr_ref.render(build("teapot", 3), view, settings)
+    assert (frame.hits.status == Status.HIT).sum() > 10
+    space = listings("dda.md", "def trace_pixel")
+    block = next(b for b in python_blocks("specification.md") if "def march_pixel" in b)
+    exec(block, space)
+    space["trace_pixel"] = space["march_pixel"]
+    check_trace(frame, space)
 
 
 def nearly_tangent_rays(frame: Frame, seed: int) -> Frame:

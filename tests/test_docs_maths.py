@@ -194,7 +194,7 @@ def test_the_walk_of_the_proof() -> None:
 
 def test_what_the_errata_say_of_defaults() -> None:
     text = plain(page(ROOT / "docs" / "errata.md"))
-    settings = ssr_ref.Settings()
+    settings = ssr_ref.Settings().resolved(1.0)
     assert f"`edge_power` {settings.edge_power:g} by default" in text
     assert f'`Settings.distance_fade` is "{settings.distance_fade}" by default' in text
     assert ssr_ref.distance_fade(1.0, 1.0) == 0.75

@@ -65,6 +65,7 @@ def materials(draw: Any, images: int) -> Material:
         draw(texture),
         draw(texture),
         draw(texture),
+        draw(maybe(st.sampled_from([0.0, 0.3, np.inf]))),
     )
 
 

@@ -133,8 +133,8 @@ def test_the_caller_s_arrays_stay_as_they_are() -> None:
     "bad",
     [{"size": (0, 5)}, {"size": (5, 16385)}, {"size": (2.5, 3)}, {"stride": 0}, {"stride": 1.5},
      {"bias": -1.0}, {"bias": np.nan}, {"thickness": -0.1}, {"max_distance": 0.0}, {"seed": -1},
-     {"tracer": "hiz"}, {"jitter": 1}, {"edge_power": 0.0}, {"max_steps": 0},
-     {"fallback_color": (0.0, -1.0, 0.0)}, {"interval": "published"}],
+     {"tracer": "hiz"}, {"jitter": 1}, {"edge_power": 0.0}, {"max_steps": 0}, {"step": -1.0},
+     {"fallback_color": (0.0, -1.0, 0.0)}, {"interval": "nearest"}],
     ids=str,
 )  # fmt: skip
 def test_settings_out_of_range_are_one_line(bad: dict) -> None:

@@ -173,7 +173,7 @@ def test_each_fade_is_available_alone() -> None:
 
 
 def test_default_fades_are_the_edge_alone() -> None:
-    """Spec 5.4: all off by default but the edge, and its power is 3 for the DDA and cells."""
-    settings = Settings()
+    """Spec 5.4: all off by default but the edge; its power is 3 for the DDA and cells."""
+    settings = Settings().resolved(1.0)
     assert (settings.edge_fade, settings.edge_power, settings.distance_fade) == (True, 3.0, "none")
     assert not settings.fresnel

@@ -40,7 +40,7 @@ def record(view: ViewParams, rules: SlabRules, ray: Ray, out: np.ndarray) -> int
     normal = np.zeros((view.height, view.width, 3), np.float32)
     n = 0
     while True:
-        walk = march_cells(view, rules, slabs, depth, back, normal, ray, 2**62)
+        walk = march_cells(view, rules, slabs, depth, back, normal, ray, 2**62, None)
         if not walk.hit.found:
             # Now all are empty: the count of tested cells must be the number recorded.
             return n if walk.cells == n else -1
@@ -54,13 +54,15 @@ def ray_of(p0: tuple[float, float], dp: tuple[float, float], end: float) -> Ray:
     """A ray whose depth is 1 everywhere, from P0 = p0; its own pixel is floor(p0)."""
     zero = Vec3(0.0, 0.0, 0.0)
     x, y = int(np.floor(p0[0])), int(np.floor(p0[1]))
-    return Ray(False, x, y, *p0, *dp, 1.0, 0.0, end, 0, 1.0, zero, 1.0, Vec3(0.0, 0.0, 1.0), -1.0)
+    return Ray(
+        False, x, y, *p0, *dp, 1.0, 0.0, end, 0, 1.0, zero, zero, 1.0, Vec3(0.0, 0.0, 1.0), -1.0
+    )
 
 
 def walked(p0: tuple[float, float], dp: tuple[float, float], end: float) -> np.ndarray:
     """(n, 3): x, y and entry of the cells that the package walks, its own pixel left out."""
     out = np.full((SIZE[0] + SIZE[1], 3), np.nan)
-    n = record(VIEW, SlabRules(1.0, 0.0, 2.0**-24, False), ray_of(p0, dp, end), out)
+    n = record(VIEW, SlabRules(1.0, 0.0, 2.0**-24, False, False), ray_of(p0, dp, end), out)
     assert n >= 0
     return out[:n]
 

@@ -71,7 +71,10 @@ def _settings(bundle: Bundle) -> list[tuple[str, str]]:
     """Settings that are not the defaults; lengths always, since they come from the scene."""
     from ..settings import Settings
 
-    usual: dict[str, Any] = json.loads(json.dumps(Settings().to_json()))
+    plain = Settings().to_json() | {"edge_power": bundle.settings.tracer_edge_power}
+    if bundle.settings.tracer != "march":
+        plain["step"] = bundle.settings.step  # of no other tracer
+    usual: dict[str, Any] = json.loads(json.dumps(plain))
     found: dict[str, Any] = json.loads(json.dumps(bundle.settings.to_json()))
     changed = [
         f"{name} {length(value) if isinstance(value, float) else json.dumps(value)}"

@@ -99,8 +99,17 @@ def render(
     ] = None,
     near: Annotated[float | None, _option(_CAMERA, "Near view depth.", "X")] = None,
     far: Annotated[float | None, _option(_CAMERA, "Far view depth, may be inf.", "X")] = None,
-    tracer: Annotated[str | None, _option(_TRACE, "Method.", "dda|cells")] = None,
+    tracer: Annotated[str | None, _option(_TRACE, "Method.", "dda|cells|march")] = None,
+    surface: Annotated[
+        str | None, _option(_TRACE, "What a pixel's surface is.", "constant|plane")
+    ] = None,
     stride: Annotated[int | None, _option(_TRACE, "Pixels between DDA samples.", "N")] = None,
+    step: Annotated[
+        float | None, _option(_TRACE, "Of the 3-D march; default radius/128.", "X")
+    ] = None,
+    growth: Annotated[
+        str | None, _option(_TRACE, "Of the march's increments.", "linear|constant")
+    ] = None,
     jitter: Annotated[
         bool | None, _option(_TRACE, "Start each ray at its own share of a stride.")
     ] = None,
@@ -116,19 +125,29 @@ def render(
         float | None, _option(_TRACE, "Of a surface without a back face.", "X")
     ] = None,
     thickness_from: Annotated[
-        str | None, _option(_TRACE, "What thickness is.", "back_faces|constant")
+        str | None,
+        _option(_TRACE, "What thickness is.", "back_faces|constant|relative|slope|material"),
     ] = None,
     back_any_object: Annotated[
         bool | None, _option(_TRACE, "Back faces of any object, as a GPU's buffer holds them.")
     ] = None,
     interval: Annotated[
-        str | None, _option(_TRACE, "Ray interval of a sample.", "column|cell")
+        str | None, _option(_TRACE, "Ray interval of a sample.", "column|cell|point|published")
     ] = None,
     refine: Annotated[
-        str | None, _option(_TRACE, "What a candidate leads to.", "auto|rewalk|none")
+        str | None, _option(_TRACE, "What a candidate leads to.", "auto|rewalk|bisect|secant|none")
+    ] = None,
+    refine_steps: Annotated[
+        int | None, _option(_TRACE, "Halvings of the march's refinement.", "N")
+    ] = None,
+    listing: Annotated[
+        bool | None, _option(_TRACE, "The march as published, with its slips; needs --max-steps.")
     ] = None,
     self_rejection: Annotated[
         str | None, _option(_TRACE, "How the own surface is left.", "plane|none")
+    ] = None,
+    facing_test: Annotated[
+        bool | None, _option(_TRACE, "Refuse faces that the ray meets from behind.")
     ] = None,
     edge_fade: Annotated[bool | None, _option(_RESOLVE, "Fade towards the image's border.")] = None,
     edge_power: Annotated[float | None, _option(_RESOLVE, "Exponent of that fade.", "X")] = None,
@@ -162,7 +181,10 @@ def render(
         fallback=None if fallback_color is None else "constant",
         fallback_color=None if fallback_color is None else parse_color(fallback_color),
         tracer=tracer,
+        surface=surface,
         stride=stride,
+        step=step,
+        growth=growth,
         jitter=jitter,
         seed=seed,
         max_steps=max_steps,
@@ -173,7 +195,10 @@ def render(
         back_any_object=back_any_object,
         interval=interval,
         refine=refine,
+        refine_steps=refine_steps,
+        listing=listing,
         self_rejection=self_rejection,
+        facing_test=facing_test,
         edge_fade=edge_fade,
         edge_power=edge_power,
         distance_fade=distance_fade,
@@ -309,12 +334,14 @@ def _report(out: Output, frame: Frame, output: Path, seconds: float) -> None:
     """What was made, on stdout."""
     from ..fileio.bundle import read_identity
     from ..fileio.manifest import statistics
+    from ..scene import Scene
 
     if out.quiet and not out.json:
         return
     counts = statistics(frame)
     content = read_identity(output)
     settings, camera = frame.settings, frame.camera
+    report = frame.scene.report if isinstance(frame.scene, Scene) else None
     width, height = settings.size
     seen = {name: n for name, n in counts["status"].items() if n}
     common = sorted(seen, key=lambda name: -seen[name])
@@ -323,7 +350,7 @@ def _report(out: Output, frame: Frame, output: Path, seconds: float) -> None:
             {
                 "output": str(output),
                 "scene": frame.scene.name,
-                "load": None if frame.scene.report is None else asdict(frame.scene.report),
+                "load": asdict(report) if report is not None else None,
                 "size": [width, height],
                 "pixels": counts["pixels"],
                 "rays": counts["rays"],
@@ -342,7 +369,7 @@ def _report(out: Output, frame: Frame, output: Path, seconds: float) -> None:
         [
             ("golden bundle", str(output)),
             ("scene", f"{frame.scene.name} ({frame.scene.triangle_count} triangles)"),
-            *(load_rows(frame.scene) if out.verbose else ()),
+            *(load_rows(frame.scene) if out.verbose and isinstance(frame.scene, Scene) else ()),
             ("size", f"{width}x{height}"),
             (
                 "lengths",

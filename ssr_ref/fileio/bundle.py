@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analytic.scene import AnalyticScene
+from ..analytic.scene_json import scene_from_json, scene_to_json
 from ..camera import Camera
 from ..errors import BundleError, FileError, SsrRefError
 from ..scene import Lights, Scene
@@ -34,7 +36,7 @@ from .npz import content_sha256, file_sha256, read_npz, write_npz
 if TYPE_CHECKING:
     from ..pipeline import Frame, Progress
 
-SCENE_FILE, PREVIEWS = "scene.glb", "previews"
+SCENE_FILE, SHAPES_FILE, PREVIEWS = "scene.glb", "scene.json", "previews"
 CAMERA_FILE, LIGHTS_FILE, SETTINGS_FILE = "camera.json", "lights.json", "settings.json"
 NPZ_FILE, EXR_FILE = "golden.npz", "golden.exr"
 RUN_FILE = "run.json"
@@ -79,7 +81,7 @@ def _write_files(frame: Frame, folder: Path, *, previews: bool, progress: Progre
         (CAMERA_FILE, _write_json, frame.camera.to_json()),
         (LIGHTS_FILE, _write_json, frame.scene.lights.to_json()),
         (SETTINGS_FILE, _write_json, frame.settings.to_json()),
-        (SCENE_FILE, _write_scene, frame.scene),
+        _scene_stage(frame.scene),
         (NPZ_FILE, write_npz, arrays),
         (EXR_FILE, _write_exr, arrays),
     ]
@@ -111,6 +113,15 @@ def _write_json(path: Path, data: Any) -> None:
 
 def _write_exr(path: Path, arrays: dict[str, Any]) -> None:
     write_exr(path, contents.exr_channels(arrays))  # the planes live no longer than this
+
+
+def _scene_stage(
+    scene: Scene | AnalyticScene,
+) -> tuple[str, Callable[[Path, Any], object], Any]:
+    """Meshes go into scene.glb, closed-form shapes into scene.json."""
+    if isinstance(scene, Scene):
+        return SCENE_FILE, _write_scene, scene
+    return SHAPES_FILE, _write_json, scene_to_json(scene)
 
 
 def _write_scene(path: Path, scene: Scene) -> None:
@@ -166,18 +177,24 @@ class Bundle:
     settings: Settings
 
     @cached_property
-    def scene(self) -> Scene:
-        """The scene that was rendered, read from scene.glb and lit by lights.json on first use.
+    def scene(self) -> Scene | AnalyticScene:
+        """The scene that was rendered, read from scene.glb (closed-form shapes: scene.json) and
+        lit by lights.json on first use.
 
         Raises BundleError if it is not the scene whose hash the manifest has.
         """
-        from .load import load
+        scene_file = _scene_file(self.manifest["files"])
+        scene: Scene | AnalyticScene
+        if scene_file == SHAPES_FILE:
+            scene = replace(scene_from_json(_read_json(self.path / scene_file)), lights=self.lights)
+        else:
+            from .load import load
 
-        loaded = load(self.path / SCENE_FILE)
-        scene = replace(loaded, lights=self.lights, name=str(self.manifest["scene"]["name"]))
+            name = str(self.manifest["scene"]["name"])
+            scene = replace(load(self.path / scene_file), lights=self.lights, name=name)
         if scene.content_sha256() != self.manifest["scene"]["content_sha256"]:
             raise BundleError(
-                f"{self.path}: {SCENE_FILE} and {LIGHTS_FILE} are not the scene of the manifest; "
+                f"{self.path}: {scene_file} and {LIGHTS_FILE} are not the scene of the manifest; "
                 "write the bundle anew"
             )
         return scene
@@ -250,9 +267,14 @@ def _read_manifest(folder: Path) -> dict[str, Any]:
     return data
 
 
+def _scene_file(named: Mapping[str, str]) -> str:
+    """Which of the two scene files a bundle has."""
+    return SHAPES_FILE if SHAPES_FILE in named else SCENE_FILE
+
+
 def _verify_files(folder: Path, manifest: Mapping[str, Any]) -> None:
-    needed = {NPZ_FILE, EXR_FILE, SCENE_FILE, CAMERA_FILE, LIGHTS_FILE, SETTINGS_FILE}
     named = manifest["files"]
+    needed = {NPZ_FILE, EXR_FILE, _scene_file(named), CAMERA_FILE, LIGHTS_FILE, SETTINGS_FILE}
     for name in sorted(needed - set(named)):
         raise BundleError(f"{folder}: {MANIFEST_FILE} does not name {name}; write the bundle anew")
     for name in sorted(named):

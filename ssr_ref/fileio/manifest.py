@@ -16,6 +16,7 @@ import numpy as np
 from .. import __version__
 from ..buffers import End, Flag, Status
 from ..errors import BundleError
+from ..scene import Scene
 from ..typed import AnyArray
 from .npz import content_sha256
 
@@ -62,6 +63,7 @@ CHANNELS: dict[str, tuple[str, ...]] = {
     },
     "hit_uv": ("hit.U", "hit.V"),
     "hit_px": (),
+    "fade_px": ("fade.X", "fade.Y"),
 }
 """EXR channels of an array's components; an array not named here has one channel of its name."""
 
@@ -150,6 +152,7 @@ def channel_names(array_name: str) -> tuple[str, ...]:
 
 def build(frame: Frame, arrays: Mapping[str, AnyArray], files: Mapping[str, str]) -> dict[str, Any]:
     """The manifest, all but its own hash. files: relative name to file_sha256."""
+    report = frame.scene.report if isinstance(frame.scene, Scene) else None
     data: dict[str, Any] = {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
@@ -159,7 +162,7 @@ def build(frame: Frame, arrays: Mapping[str, AnyArray], files: Mapping[str, str]
             "content_sha256": frame.scene.content_sha256(),
             "triangles": int(frame.scene.triangle_count),
             "objects": len(frame.scene.nodes),
-            **({} if frame.scene.report is None else {"load": asdict(frame.scene.report)}),
+            **({} if report is None else {"load": asdict(report)}),
         },
         "size": list(frame.settings.size),
         "camera": frame.camera.to_json(),

@@ -17,7 +17,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from ..meshfiles.gltf_materials import ALPHA_KEY, EMISSIVE_KEY, REFLECTIVITY_KEY, UNLIT_KEY
+from ..meshfiles.gltf_materials import (
+    ALPHA_KEY,
+    EMISSIVE_KEY,
+    REFLECTIVITY_KEY,
+    THICKNESS_KEY,
+    UNLIT_KEY,
+)
 from ..meshfiles.gltf_primitives import COLOR_KEY, TRIANGLES
 from ..meshfiles.images import png_bytes
 from ..scene import Material, Mesh, Primitive, Scene
@@ -245,6 +251,9 @@ def _material(material: Material, textures: _Textures) -> dict[str, Any]:
         extras[ALPHA_KEY] = material.alpha
     if material.reflectivity is not None:
         extras[REFLECTIVITY_KEY] = [float(v) for v in material.reflectivity]
+    if material.thickness is not None:
+        endless = np.isinf(material.thickness)
+        extras[THICKNESS_KEY] = "inf" if endless else material.thickness
     for owner, key, texture in (
         (pbr, "baseColorTexture", material.base_color_texture),
         (pbr, "metallicRoughnessTexture", material.metallic_roughness_texture),

@@ -9,6 +9,8 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ..scene import Material
 from ..texture import Texture
 from ..typed import Rgb
@@ -26,6 +28,9 @@ EMISSIVE_KEY = "ssr_ref_emissive"
 
 UNLIT_KEY = "ssr_ref_unlit"
 """Key in a material's `extras`, true: an unlit material keeps its other factors and textures."""
+
+THICKNESS_KEY = "ssr_ref_thickness"
+"""Key in a material's `extras` that holds `Material.thickness`, "inf" for an infinite one."""
 
 DEFAULT_CUTOFF = 0.5
 
@@ -106,6 +111,11 @@ class Materials:
             alpha = base[3]
         elif ALPHA_KEY in extras:
             alpha = gltf.number(extras[ALPHA_KEY], f"{where}.extras.{ALPHA_KEY}")
+        thickness: float | None = None
+        if THICKNESS_KEY in extras:
+            value = extras[THICKNESS_KEY]
+            name = f"{where}.extras.{THICKNESS_KEY}"
+            thickness = np.inf if value == "inf" else gltf.number(value, name)
         unlit = gltf.extension(entry, "KHR_materials_unlit", where) is not None
         bare = _bare(entry)
         metallic = gltf.number(pbr.get("metallicFactor", 1.0), f"{where}.metallicFactor")
@@ -118,6 +128,7 @@ class Materials:
             roughness=1.0 if bare else roughness,
             emissive=(0.0, 0.0, 0.0) if bare else self._emission(entry, where),
             reflectivity=reflectivity,
+            thickness=thickness,
             double_sided=entry.get("doubleSided", False) is True,
             alpha=alpha,
             alpha_cutoff=cutoff,

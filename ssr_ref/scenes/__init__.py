@@ -120,8 +120,6 @@ def framed_view(scene: Scene) -> View:
     as high). With an added mirror floor the view moves down and back, so that it also holds the
     mirror image down to one radius below the floor.
     """
-    from ..camera import View
-
     shown = tuple(node for node in scene.nodes if node.name != MIRROR_FLOOR)
     mirrored = 0 < len(shown) < len(scene.nodes)
     low, high = (replace(scene, nodes=shown) if mirrored else scene).world_bounds()
@@ -131,6 +129,16 @@ def framed_view(scene: Scene) -> View:
         drop = (target[1] - float(low[1])) / 2.0
         radius = radius + drop
         target = (target[0], target[1] - drop, target[2])
+    return _view_of_ball(target, radius)
+
+
+def view_of_bounds(low: F64Array, high: F64Array) -> View:
+    """The same view of whatever lies within these bounds, two (3,) arrays."""
+    return _view_of_ball(*_ball(low, high))
+
+
+def _view_of_ball(target: tuple[float, float, float], radius: float) -> View:
+    from ..camera import View
 
     distance = MARGIN * ONE_OVER_SIN_20 * radius
     eye = tuple(t + distance * d for t, d in zip(target, VIEW_FROM))

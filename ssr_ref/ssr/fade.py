@@ -45,3 +45,16 @@ def distance_fade(length: float, max_distance: float, kind: int) -> float:
     if kind == LINEAR:
         return clamp01(1.0 - share)
     return clamp01(power(PUBLISHED_BASE, share))
+
+
+@kernel
+def listed_edge_fade(u: float, v: float, exponent: float) -> float:
+    """1 − (2·|uv − ½|)^p as published: |·| is the length of the vector, and nothing is clamped.
+
+    It is below 0 beyond the ellipse that the image's sides touch, −1 in the corners for p = 2.
+    """
+    du, dv = 2.0 * (u - 0.5), 2.0 * (v - 0.5)
+    squared = du * du + dv * dv
+    if exponent == 2.0:
+        return 1.0 - squared
+    return 1.0 - power(np.sqrt(squared), exponent)

@@ -20,6 +20,7 @@ from ..vecmath.vec import Vec3, dot
 from .ray import Ray, depth_at, position_x, position_y, s_of_depth
 
 PASSED_BEHIND, SELF_REJECTED = int(Flag.PASSED_BEHIND), int(Flag.SELF_REJECTED)
+BACK_FACE_REJECTED = int(Flag.BACK_FACE_REJECTED)
 OVER_EMPTY, OPEN = int(Flag.OVER_EMPTY), int(Flag.OPEN)
 MISS, BEHIND, IN_SLAB = 0, 1, 2
 
@@ -27,6 +28,7 @@ MISS, BEHIND, IN_SLAB = 0, 1, 2
 class SlabRules(NamedTuple):
     """What decides a hit, besides the buffers. Lengths in scene units.
 
+    thickness: what a residual may not exceed at an open pixel; inf where the model is another one.
     rounding: unit roundoff of the buffers, 2⁻²⁴ or 2⁻⁵³. Scalars only: arrays in a tuple cost a
     reference count at each use, which is more than the test itself.
     """
@@ -35,6 +37,7 @@ class SlabRules(NamedTuple):
     bias: float
     rounding: float
     reject_self: bool
+    facing_test: bool
 
 
 class Slab(NamedTuple):
@@ -95,6 +98,21 @@ def above_tangent_plane(
         + (z_q * (abs(n.y) + rho * abs(m.y)) + z_o * abs(n.y)) / view.fy
     )
     return dot(n, qo) > by_rounding + by_snapping
+
+
+@kernel
+def refusal(
+    view: ViewParams, rules: SlabRules, ray: Ray, x: int, y: int, depth: float, m: Vec3
+) -> int:
+    """Why a candidate cannot be a hit, as a flag; 0 if it can.
+
+    m: the pixel's geometric normal. A face whose normal the ray goes along is met from behind.
+    """
+    if rules.reject_self and not above_tangent_plane(view, rules.rounding, ray, x, y, depth, m):
+        return SELF_REJECTED
+    if rules.facing_test and not dot(m, ray.direction_vs) < 0.0:
+        return BACK_FACE_REJECTED
+    return 0
 
 
 @kernel

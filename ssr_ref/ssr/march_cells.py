@@ -18,32 +18,36 @@ from ..typed import F64Array, FloatArray
 from .hit import (
     BEHIND,
     IN_SLAB,
+    MISS,
     OVER_EMPTY,
     PASSED_BEHIND,
-    SELF_REJECTED,
     Hit,
     SlabRules,
-    above_tangent_plane,
     compare_with_slab,
     load3,
     load_slab,
     locate_hit,
     no_hit,
+    refusal,
 )
 from .ray import Ray, depth_at, position_x, position_y
+from .record import EMPTY, HIT, IN_FRONT, PASSED, Log, write
 
 OWN_PIXEL = 0.5
 """s at which a ray has left its own pixel along the major axis."""
 
 
 class CellWalk(NamedTuple):
-    """Outcome of a walk: the hit, flags met, cells tested, reads, and whether cells were left."""
+    """Outcome of a walk: the hit, flags met, cells tested, reads; whether cells were left; whether
+    it entered a solid through a face that the camera cannot see.
+    """
 
     hit: Hit
     flags: int
     cells: int
     fetches: int
     out_of_cells: bool
+    blocked: bool
 
 
 @kernel
@@ -109,6 +113,7 @@ def next_candidate(
     walker: Walker,
     move: bool,
     max_cells: int,
+    log: Log | None,
 ) -> Walker:
     """Go on over cells that are plain misses, to the first that the ray's interval meets.
 
@@ -152,6 +157,11 @@ def next_candidate(
         cells += 1
         low = slabs[y, x, 0]
         verdict = compare_with_slab(z_entry, z_leave, low, slabs[y, x, 1])
+        if log is not None:
+            what = EMPTY if low == np.inf else (IN_FRONT if verdict == MISS else PASSED)
+            if low == np.inf or verdict != IN_SLAB:
+                z_back = slabs[y, x, 1]
+                write(log, entry, x, y, entry, leave, z_entry, z_leave, low, z_back, what)
         if low == np.inf:
             empty += 1
         elif verdict == IN_SLAB:
@@ -194,37 +204,53 @@ def walk_cells(
     b: float,
     skip_first: bool,
     max_cells: int,
+    log: Log | None,
 ) -> CellWalk:
     """Walk the cells from (x, y) to (x_last, y_last) over a ≤ s ≤ b; the first hit ends it.
 
     skip_first: the first cell is the origin's own and is neither tested nor counted.
     """
     if x < 0 or y < 0 or x >= view.width or y >= view.height:
-        return CellWalk(no_hit(), 0, 0, 0, False)
+        return CellWalk(no_hit(), 0, 0, 0, False, False)
     reads = 2 if back.shape[0] > 0 else 1  # of a pixel that is not empty
     walker = start_walk(ray, x, y, x_last, y_last, a, b)
     move = skip_first
     refused = 0
     hit = no_hit()
     while True:
-        walker = next_candidate(view.width, view.height, slabs, ray, b, walker, move, max_cells)
+        walker = next_candidate(
+            view.width, view.height, slabs, ray, b, walker, move, max_cells, log
+        )
         if walker.why != CANDIDATE:
             break
         x, y = walker.x, walker.y
         z_front = np.float64(depth[y, x])
-        if not rules.reject_self or above_tangent_plane(
-            view, rules.rounding, ray, x, y, z_front, load3(normal, y, x)
-        ):
+        why_not = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
+        if log is not None:
+            write(
+                log,
+                walker.entry,
+                x,
+                y,
+                walker.entry,
+                walker.leave,
+                walker.z_entry,
+                walker.z_leave,
+                slabs[y, x, 0],
+                slabs[y, x, 1],
+                HIT if why_not == 0 else refused(why_not),
+            )
+        if why_not == 0:
             slab = load_slab(slabs, depth, back, x, y)
             hit = locate_hit(rules, ray, slab, x, y, walker.entry, walker.leave, True)
             break
-        refused = SELF_REJECTED
+        refused |= why_not
         move = True
     flags = refused
     flags |= OVER_EMPTY if walker.empty > 0 else 0
     flags |= PASSED_BEHIND if walker.behind > 0 else 0
     fetches = walker.cells * reads - walker.empty * (reads - 1)
-    return CellWalk(hit, flags, walker.cells, fetches, walker.why == LIMIT)
+    return CellWalk(hit, flags, walker.cells, fetches, walker.why == LIMIT, False)
 
 
 @kernel
@@ -237,6 +263,7 @@ def march_cells(
     normal: FloatArray,
     ray: Ray,
     max_steps: int,
+    log: Log | None,
 ) -> CellWalk:
     """Exact walk of a whole ray, the origin's own pixel left out."""
     x_last = np.int64(np.floor(position_x(ray, ray.s_end)))
@@ -257,6 +284,7 @@ def march_cells(
         ray.s_end,
         True,
         max_steps,
+        log,
     )
 
 
@@ -271,6 +299,7 @@ def rewalk(
     ray: Ray,
     a: float,
     b: float,
+    log: Log | None,
 ) -> CellWalk:
     """Exact walk of one interval, as refinement of a strided sample."""
     limit = view.width + view.height + 2
@@ -280,6 +309,26 @@ def rewalk(
     x = ray.x if own else cell_after(position_x(ray, a), ray.dp_x)
     y = ray.y if own else cell_after(position_y(ray, a), ray.dp_y)
     start = 0.0 if own else a
-    return walk_cells(
-        view, rules, slabs, depth, back, normal, ray, x, y, x_last, y_last, start, b, own, limit
+    if log is not None:
+        log.state[1] = 1
+    walk = walk_cells(
+        view,
+        rules,
+        slabs,
+        depth,
+        back,
+        normal,
+        ray,
+        x,
+        y,
+        x_last,
+        y_last,
+        start,
+        b,
+        own,
+        limit,
+        log,
     )
+    if log is not None:
+        log.state[1] = 0
+    return walk

@@ -18,19 +18,27 @@ from ..typed import F64Array, FloatArray
 from .hit import (
     BEHIND,
     IN_SLAB,
+    MISS,
     OVER_EMPTY,
     PASSED_BEHIND,
-    SELF_REJECTED,
+    Hit,
     SlabRules,
-    above_tangent_plane,
     compare_with_slab,
     load3,
     load_slab,
     locate_hit,
     no_hit,
+    refusal,
 )
 from .march_cells import OWN_PIXEL, CellWalk, crossing, rewalk
 from .ray import Ray, depth_at, position_x, position_y
+from .record import EMPTY, HIT, IN_FRONT, PASSED, PROPOSED, Log, refused, write
+
+NO_REFINE, REWALK, BISECT = 0, 1, 2
+"""What a candidate leads to: a hit, an exact walk of its interval, or halving it."""
+
+COLUMN, CELL, POINT, PUBLISHED = 0, 1, 2, 3
+"""A sample's interval: half a stride either side; that inside its cell; itself; from the origin."""
 
 
 @kernel
@@ -113,6 +121,52 @@ def inside_image(view: ViewParams, ray: Ray, s: float) -> bool:
 
 
 @kernel
+def bisect(
+    view: ViewParams,
+    rules: SlabRules,
+    slabs: F64Array,
+    depth: FloatArray,
+    back: FloatArray,
+    ray: Ray,
+    a: float,
+    b: float,
+    reads: int,
+) -> tuple[Hit, int]:
+    """Halve [a, b] down to half a pixel, keeping the half whose end is behind its front.
+
+    The hit at the deeper end's pixel, and the reads. It assumes one change of sign: an interval
+    whose end lies in no slab gives no hit, and the sample's own is kept.
+    """
+    fetches = 0
+    width = b - a
+    while width > 0.5:
+        middle = 0.5 * (a + b)
+        width *= 0.5
+        if not inside_image(view, ray, middle):
+            b = middle
+            continue
+        x, y = np.int64(position_x(ray, middle)), np.int64(position_y(ray, middle))
+        low = slabs[y, x, 0]
+        fetches += 1 if low == np.inf else reads
+        if depth_at(ray, middle) >= low:
+            b = middle
+        else:
+            a = middle
+    if not inside_image(view, ray, b):
+        return no_hit(), fetches
+    x, y = np.int64(position_x(ray, b)), np.int64(position_y(ray, b))
+    low = slabs[y, x, 0]
+    fetches += 1 if low == np.inf else reads
+    if (
+        low == np.inf
+        or compare_with_slab(depth_at(ray, a), depth_at(ray, b), low, slabs[y, x, 1]) != IN_SLAB
+    ):
+        return no_hit(), fetches
+    slab = load_slab(slabs, depth, back, x, y)
+    return locate_hit(rules, ray, slab, x, y, a, b, False), fetches
+
+
+@kernel
 def march_dda(
     view: ViewParams,
     rules: SlabRules,
@@ -123,14 +177,16 @@ def march_dda(
     ray: Ray,
     stride: int,
     offset: float,
-    refine: bool,
-    cell_interval: bool,
+    refine: int,
+    interval: int,
     max_steps: int,
+    log: Log | None,
 ) -> CellWalk:
     """Walk a ray by samples s_i = (i + offset)·stride, i = 0, 1, …, offset in (0, 1].
 
-    `cells` of the result counts samples tested, the hit included; re-walked cells count in
-    `fetches` only. Flags are those of the tested samples' own pixels.
+    refine: NO_REFINE, REWALK or BISECT. interval: COLUMN, CELL, POINT or PUBLISHED. `cells` of the
+    result counts samples tested, the hit included; re-walked cells and halvings count in `fetches`
+    only. Flags are those of the tested samples' own pixels.
     """
     reads = 2 if back.shape[0] > 0 else 1  # of a pixel that is not empty
     stride_px = np.float64(stride)
@@ -141,13 +197,14 @@ def march_dda(
     while (first + offset) * stride_px <= OWN_PIXEL:
         first += 1
     i = first
+    start = 0.0 if interval == PUBLISHED else OWN_PIXEL
     i_end = min(count_inside(view, ray, stride_px, offset, first), first + max_steps)
-    z_a = depth_at(ray, OWN_PIXEL)
+    z_a = depth_at(ray, start)
     flags = 0
     fetches = 0
     while True:
         # The first interval is always re-walked; from then on only candidates are of interest.
-        if not refine or i > first:
+        if log is None and (refine != REWALK or i > first):
             scan = skip_misses(slabs, ray, stride_px, offset, i, i_end, z_a)
             fetches += (scan.i - i) * reads - scan.empty * (reads - 1)
             flags |= OVER_EMPTY if scan.empty > 0 else 0
@@ -156,7 +213,7 @@ def march_dda(
 
         # The sample's place and interval; what is left after the last one gets its middle.
         s = (i + offset) * stride_px
-        a = OWN_PIXEL if i == first else min((i - 1 + offset) * stride_px + half, ray.s_end)
+        a = start if i == first else min((i - 1 + offset) * stride_px + half, ray.s_end)
         b = min(s + half, ray.s_end)
         last = s >= ray.s_end
         if last:
@@ -167,7 +224,7 @@ def march_dda(
         if not inside_image(view, ray, s):
             break
         if i - first == max_steps:
-            return CellWalk(no_hit(), flags, i - first, fetches, True)
+            return CellWalk(no_hit(), flags, i - first, fetches, True, False)
         x, y = np.int64(position_x(ray, s)), np.int64(position_y(ray, s))
         z_b = depth_at(ray, b)
 
@@ -175,36 +232,50 @@ def march_dda(
         i += 1
         steps = i - first
         low, z_back = slabs[y, x, 0], slabs[y, x, 1]
-        propose = refine and steps == 1
+        propose = refine == REWALK and steps == 1
+        near, far, z_near, z_far = a, b, z_a, z_b
+        if interval == CELL:
+            near, far = clamp_to_cell(ray, x, y, a, b)
+            z_near, z_far = depth_at(ray, near), depth_at(ray, far)
+        elif interval == POINT:
+            near, far = s, s
+            z_near, z_far = depth_at(ray, s), depth_at(ray, s)
+        verdict = MISS if low == np.inf else compare_with_slab(z_near, z_far, low, z_back)
+        why_not = 0
         if low == np.inf:
             fetches += 1
             flags |= OVER_EMPTY
         else:
             fetches += reads
-            near, far, z_near, z_far = a, b, z_a, z_b
-            if cell_interval:
-                near, far = clamp_to_cell(ray, x, y, a, b)
-                z_near, z_far = depth_at(ray, near), depth_at(ray, far)
-            verdict = compare_with_slab(z_near, z_far, low, z_back)
             if verdict == BEHIND:
                 flags |= PASSED_BEHIND
             elif verdict == IN_SLAB:
-                propose = refine
+                propose = refine == REWALK
                 z_front = np.float64(depth[y, x])
-                if rules.reject_self and not above_tangent_plane(
-                    view, rules.rounding, ray, x, y, z_front, load3(normal, y, x)
-                ):
-                    flags |= SELF_REJECTED
-                elif not refine:
-                    slab = load_slab(slabs, depth, back, x, y)
-                    hit = locate_hit(rules, ray, slab, x, y, near, far, cell_interval)
-                    return CellWalk(hit, flags, steps, fetches, False)
+                why_not = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
+                flags |= why_not
+        if log is not None:
+            what = EMPTY if low == np.inf else (IN_FRONT if verdict == MISS else PASSED)
+            if propose:
+                what = PROPOSED
+            elif verdict == IN_SLAB:
+                what = HIT if why_not == 0 else refused(why_not)
+            write(log, s, x, y, near, far, z_near, z_far, low, z_back, what)
+        if verdict == IN_SLAB and why_not == 0 and refine != REWALK:
+            slab = load_slab(slabs, depth, back, x, y)
+            hit = locate_hit(rules, ray, slab, x, y, near, far, interval == CELL)
+            if refine == BISECT:
+                better, reads_more = bisect(view, rules, slabs, depth, back, ray, near, far, reads)
+                fetches += reads_more
+                if better.found:
+                    hit = better
+            return CellWalk(hit, flags, steps, fetches, False, False)
         if propose:
-            walk = rewalk(view, rules, slabs, depth, back, normal, ray, a, b)
+            walk = rewalk(view, rules, slabs, depth, back, normal, ray, a, b, log)
             fetches += walk.fetches
             if walk.hit.found:
-                return CellWalk(walk.hit, flags, steps, fetches, False)
+                return CellWalk(walk.hit, flags, steps, fetches, False, False)
         if last:
             break
         z_a = z_b
-    return CellWalk(no_hit(), flags, i - first, fetches, False)
+    return CellWalk(no_hit(), flags, i - first, fetches, False, False)

@@ -44,6 +44,7 @@ class Ray(NamedTuple):
     end: int  # `End`: the bound at s_end
     length_scale: float  # length(s) = s · length_scale / k(s) (orthographic: s · length_scale)
     origin_vs: Vec3
+    direction_vs: Vec3  # unit
     origin_depth: float
     normal_vs: Vec3  # geometric, as stored
     normal_dot_ray: float  # n·d of the origin
@@ -151,7 +152,9 @@ def clip_ray(view: ViewParams, origin: Vec3, r: Vec3, depth: float, max_distance
 def no_ray(status: int) -> tuple[int, Ray]:
     """A status that needs no walk, with an empty ray."""
     zero = Vec3(0.0, 0.0, 0.0)
-    return status, Ray(True, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.0, zero, 0.0, zero, 0.0)
+    return status, Ray(
+        True, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.0, zero, zero, 0.0, zero, 0.0
+    )
 
 
 @kernel
@@ -238,6 +241,7 @@ def set_up_ray(
             end,
             0.0,
             origin,
+            r,
             depth,
             geo_normal,
             facing,
@@ -256,6 +260,7 @@ def set_up_ray(
         end,
         scale / s_end,
         origin,
+        r,
         depth,
         geo_normal,
         facing,

@@ -18,7 +18,7 @@ from ..raster.attributes import store3
 from ..settings import Settings
 from ..typed import F64Array, FloatArray, U8Array
 from ..vecmath.vec import Vec3, dot, normalize
-from .fade import LINEAR, NO_FADE, PUBLISHED, distance_fade, edge_fade
+from .fade import LINEAR, NO_FADE, PUBLISHED, distance_fade, edge_fade, listed_edge_fade
 from .hit import load3
 
 HIT, BACKGROUND = int(Status.HIT), int(Status.BACKGROUND)
@@ -72,12 +72,14 @@ def resolve_rows(
     view: ViewParams,
     status: U8Array,
     hit_px: F64Array,
-    length: F64Array,
+    fade_px: F64Array,
+    fade_length: F64Array,
     radiance: FloatArray,
     reflectivity: FloatArray,
     normal: FloatArray,
     edge: bool,
     edge_power: float,
+    listed: bool,
     distance_kind: int,
     max_distance: float,
     fresnel: bool,
@@ -106,8 +108,13 @@ def resolve_rows(
             color = Vec3(fallback[0], fallback[1], fallback[2])
             if code == HIT:
                 px, py = hit_px[y, x, 0], hit_px[y, x, 1]
-                fade_e = edge_fade(px / view.width, py / view.height, edge_power) if edge else 1.0
-                fade_d = distance_fade(length[y, x], max_distance, distance_kind)
+                u, v = fade_px[y, x, 0] / view.width, fade_px[y, x, 1] / view.height
+                fade_e = 1.0
+                if edge and listed:
+                    fade_e = listed_edge_fade(u, v, edge_power)
+                elif edge:
+                    fade_e = edge_fade(u, v, edge_power)
+                fade_d = distance_fade(fade_length[y, x], max_distance, distance_kind)
                 c = fade_e * fade_d
                 hit = load3(radiance, texel(py, view.height), texel(px, view.width))
                 color = Vec3(
@@ -153,12 +160,14 @@ def resolve(view: ViewParams, gbuffer: GBuffer, hits: HitBuffer, settings: Setti
         view,
         hits.status,
         hits.hit_px,
-        hits.length,
+        hits.hit_px if hits.fade_px is None else hits.fade_px,
+        hits.length if hits.fade_length is None else hits.fade_length,
         gbuffer.radiance,
         gbuffer.reflectivity,
         gbuffer.normal_vs,
         settings.edge_fade,
-        float(settings.edge_power),
+        settings.edge_exponent,
+        settings.listing,
         kinds[settings.distance_fade],
         float(settings.max_distance),
         settings.fresnel,

@@ -3,33 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numba import prange
 
-from .._jit import driver, kernel
-from ..buffers import STATUS_OF_END, End, Flag, GBuffer, HitBuffer, Status
+from .._jit import driver
+from ..buffers import GBuffer, HitBuffer
 from ..camera import ViewParams, ray_through
 from ..errors import SettingsError
 from ..settings import Settings
-from ..typed import F64Array, FloatArray, U8Array, U32Array
+from ..typed import F64Array, FloatArray
 from ..vecmath.noise import jitter
 from ..vecmath.vec import dot
+from . import march_view
 from .hit import SlabRules, load3
-from .march_cells import OWN_PIXEL, march_cells
-from .march_dda import march_dda
-from .ray import WALK, length_at, set_up_ray
+from .listing_march import ALL_SLIPS, trace_listing_rows
+from .march_cells import march_cells
+from .march_dda import (
+    BISECT,
+    CELL,
+    COLUMN,
+    NO_REFINE,
+    POINT,
+    PUBLISHED,
+    REWALK,
+    march_dda,
+)
+from .planes import gradient, prepare_planes
+from .rows import CELLS, DDA, Inputs, Outputs, close_pixel, open_pixel
+from .trace_march import trace_march_rows
+from .trace_planes import trace_plane_rows
 
-HIT, BACKGROUND = int(Status.HIT), int(Status.BACKGROUND)
-NOT_REFLECTIVE = int(Status.NOT_REFLECTIVE)
-STATUS_PASSED_BEHIND, STATUS_SELF = int(Status.PASSED_BEHIND), int(Status.SELF)
-FLAG_PASSED_BEHIND, FLAG_SELF = int(Flag.PASSED_BEHIND), int(Flag.SELF_REJECTED)
-OUT_OF_STEPS = int(End.OUT_OF_STEPS)
-END_TO_STATUS = int(STATUS_OF_END)
-
-CELLS, DDA = 0, 1
 NO_LIMIT = 2**62
+
+CONSTANT, RELATIVE, SLOPE, IMAGE = 0, 1, 2, 3
+"""What a pixel without back face ends with."""
+_MODELS = {"relative": RELATIVE, "slope": SLOPE, "material": IMAGE}
+_INTERVALS = {"column": COLUMN, "cell": CELL, "point": POINT, "published": PUBLISHED}
+_REFINES = {"none": NO_REFINE, "rewalk": REWALK, "bisect": BISECT}
 
 
 @driver()
@@ -38,39 +51,41 @@ def prepare_slabs(
     depth: FloatArray,
     geo_normal: FloatArray,
     back: FloatArray,
+    model: int,
     thickness: float,
+    thickness_image: FloatArray,
     bias: float,
     slabs: F64Array,
 ) -> None:
     """slabs (H, W, 2) = front + bias and back of every pixel, view depths.
 
-    back is the back-face depth where there is one, else front + thickness. Both are +inf where a
-    pixel cannot be hit: empty, bad depth, or facing away.
+    back is the back-face depth where there is one, else by the model: CONSTANT front + thickness,
+    RELATIVE front·(1 + thickness), SLOPE the constant and the range of depth that the surface spans
+    inside its pixel, IMAGE front + thickness_image. Both are +inf where a pixel cannot be hit:
+    empty, bad depth, or facing away.
     """
     has_back = back.shape[0] > 0
     for y in prange(view.height):
         for x in range(view.width):
             z = np.float64(depth[y, x])
-            facing = dot(load3(geo_normal, y, x), ray_through(view, x + 0.5, y + 0.5))
+            n = load3(geo_normal, y, x)
+            facing = dot(n, ray_through(view, x + 0.5, y + 0.5))
             low = np.inf
             z_back = np.inf
             if z > 0.0 and facing < 0.0:
                 low = z + bias
                 z_back = z + thickness
+                if model == RELATIVE:
+                    z_back = z * (1.0 + thickness)
+                elif model == SLOPE:
+                    gx, gy = gradient(view, n, z, facing)
+                    z_back += (abs(gx) + abs(gy)) * (z * z if view.perspective else 1.0)
+                elif model == IMAGE:
+                    z_back = z + np.float64(thickness_image[y, x])
                 if has_back and back[y, x] < np.inf:
                     z_back = np.float64(back[y, x])
             slabs[y, x, 0] = low
             slabs[y, x, 1] = z_back
-
-
-@kernel
-def miss_status(flags: int, end: int) -> int:
-    """The first reason that applies to a ray that met nothing."""
-    if flags & FLAG_PASSED_BEHIND:
-        return STATUS_PASSED_BEHIND
-    if flags & FLAG_SELF:
-        return STATUS_SELF
-    return end + END_TO_STATUS
 
 
 @driver()
@@ -82,74 +97,27 @@ def trace_rows(
     stride: int,
     jittered: bool,
     seed: int,
-    refine: bool,
-    cell_interval: bool,
+    refine: int,
+    interval: int,
     max_steps: int,
     max_distance: float,
-    depth: FloatArray,
-    geo_normal: FloatArray,
-    normal: FloatArray,
-    reflectivity: FloatArray,
-    slabs: F64Array,
-    back: FloatArray,
     thickness: float,
     bias: float,
     rounding: float,
     reject_self: bool,
-    status: U8Array,
-    end: U8Array,
-    flags: U8Array,
-    hit_px: F64Array,
-    hit_depth: F64Array,
-    residual: F64Array,
-    length: F64Array,
-    steps: U32Array,
-    fetches: U32Array,
+    facing_test: bool,
+    slabs: F64Array,
+    inputs: Inputs,
+    out: Outputs,
 ) -> None:
     """Trace rows row0 to row1 − 1; each pixel writes only its own outputs."""
     for y in prange(row0, row1):
-        rules = SlabRules(thickness, bias, rounding, reject_self)
+        rules = SlabRules(thickness, bias, rounding, reject_self, facing_test)
+        depth, back, geo_normal = inputs.depth, inputs.back, inputs.geo_normal
         for x in range(view.width):
-            end[y, x] = 0
-            flags[y, x] = 0
-            hit_px[y, x, 0] = np.nan
-            hit_px[y, x, 1] = np.nan
-            hit_depth[y, x] = np.nan
-            residual[y, x] = np.nan
-            length[y, x] = np.nan
-            steps[y, x] = 0
-            fetches[y, x] = 0
-
-            # Pixels that need no ray.
-            z = np.float64(depth[y, x])
-            if z == np.inf:
-                status[y, x] = BACKGROUND
+            walks, ray = open_pixel(view, inputs, out, x, y, max_distance)
+            if not walks:
                 continue
-            if (
-                reflectivity[y, x, 0] == 0.0
-                and reflectivity[y, x, 1] == 0.0
-                and reflectivity[y, x, 2] == 0.0
-            ):
-                status[y, x] = NOT_REFLECTIVE
-                continue
-            outcome, ray = set_up_ray(
-                view,
-                x,
-                y,
-                z,
-                load3(normal, y, x),
-                load3(geo_normal, y, x),
-                max_distance,
-            )
-            if outcome != WALK:
-                status[y, x] = outcome
-                continue
-            if not ray.s_end > OWN_PIXEL:
-                end[y, x] = ray.end
-                status[y, x] = miss_status(0, ray.end)
-                continue
-
-            # Walk.
             if tracer == DDA:
                 offset = jitter(x, y, seed) if jittered else 1.0
                 walk = march_dda(
@@ -163,26 +131,15 @@ def trace_rows(
                     stride,
                     offset,
                     refine,
-                    cell_interval,
+                    interval,
                     max_steps,
+                    None,
                 )
             else:
-                walk = march_cells(view, rules, slabs, depth, back, geo_normal, ray, max_steps)
-            steps[y, x] = walk.cells
-            fetches[y, x] = walk.fetches
-            flags[y, x] = walk.flags
-            if walk.hit.found:
-                status[y, x] = HIT
-                flags[y, x] = walk.flags | walk.hit.flags
-                hit_px[y, x, 0] = walk.hit.px
-                hit_px[y, x, 1] = walk.hit.py
-                hit_depth[y, x] = walk.hit.depth
-                residual[y, x] = walk.hit.residual
-                length[y, x] = length_at(ray, walk.hit.s)
-            else:
-                bound = OUT_OF_STEPS if walk.out_of_cells else ray.end
-                end[y, x] = bound
-                status[y, x] = miss_status(walk.flags, bound)
+                walk = march_cells(
+                    view, rules, slabs, depth, back, geo_normal, ray, max_steps, None
+                )
+            close_pixel(out, x, y, ray, walk)
 
 
 def trace(
@@ -199,6 +156,8 @@ def trace(
     """
     if settings.thickness is None or settings.max_distance is None:
         raise SettingsError("thickness or max_distance is None; expected Settings.resolved(radius)")
+    if settings.tracer == "march" and settings.step is None:
+        raise SettingsError("step is None; expected Settings.resolved(radius)")
     assert gbuffer.geo_normal_vs is not None
     assert gbuffer.normal_vs is not None
     assert gbuffer.reflectivity is not None
@@ -207,15 +166,8 @@ def trace(
     if settings.thickness_from == "back_faces":
         assert gbuffer.back_depth is not None
         back = gbuffer.back_depth
-    slabs = np.empty((*shape, 2))
-    prepare_slabs(
-        view,
-        gbuffer.depth,
-        gbuffer.geo_normal_vs,
-        back,
-        float(settings.thickness),
-        float(settings.bias),
-        slabs,
+    inputs = Inputs(
+        gbuffer.depth, gbuffer.geo_normal_vs, gbuffer.normal_vs, gbuffer.reflectivity, back
     )
     hits = HitBuffer(
         status=np.empty(shape, np.uint8),
@@ -228,40 +180,63 @@ def trace(
         steps=np.empty(shape, np.uint32),
         fetches=np.empty(shape, np.uint32),
     )
-    fixed: tuple[Any, ...] = (
-        DDA if settings.tracer == "dda" else CELLS,
-        settings.stride,
-        settings.jitter,
-        settings.seed,
-        settings.refines,
-        settings.interval == "cell",
-        NO_LIMIT if settings.max_steps is None else settings.max_steps,
-        float(settings.max_distance),
-        gbuffer.depth,
-        gbuffer.geo_normal_vs,
-        gbuffer.normal_vs,
-        gbuffer.reflectivity,
-        slabs,
-        back,
-        float(settings.thickness),
-        float(settings.bias),
-        2.0**-53 if gbuffer.depth.dtype == np.float64 else 2.0**-24,
-        settings.self_rejection == "plane",
-        hits.status,
-        hits.end,
-        hits.flags,
-        hits.hit_px,
-        hits.hit_depth,
-        hits.residual,
-        hits.length,
-        hits.steps,
-        hits.fetches,
-    )
+    out = Outputs(*(getattr(hits, name) for name in Outputs._fields))
+    tracer = DDA if settings.tracer == "dda" else CELLS
+    thickness, max_distance = float(settings.thickness), float(settings.max_distance)
+    max_steps = NO_LIMIT if settings.max_steps is None else settings.max_steps
+    rounding = 2.0**-53 if gbuffer.depth.dtype == np.float64 else 2.0**-24
+    rejects = (settings.self_rejection == "plane", settings.facing_test)
+    start = (tracer, settings.stride, settings.jitter, settings.seed)
+    rows: Any
+    fixed: tuple[Any, ...]
+    if settings.surface == "plane":
+        planes = np.empty((*shape, 4))
+        prepare_planes(view, inputs.depth, inputs.geo_normal, back, thickness, planes)
+        rows = trace_plane_rows
+        fixed = (*start, max_steps, max_distance, thickness, rounding, *rejects, planes)
+    else:
+        slabs = np.empty((*shape, 2))
+        bias = float(settings.bias)
+        model = _MODELS.get(settings.thickness_from, CONSTANT)
+        image = np.empty((0, 0), gbuffer.depth.dtype)
+        if model == IMAGE:
+            assert gbuffer.thickness is not None
+            image = gbuffer.thickness
+        prepare_slabs(
+            view, inputs.depth, inputs.geo_normal, back, model, thickness, image, bias, slabs
+        )
+        most = thickness if model == CONSTANT else np.inf
+        fixed = (max_steps, max_distance, most, bias, rounding, *rejects, slabs)
+        if settings.listing:
+            hits = replace(hits, fade_px=np.empty((*shape, 2)), fade_length=np.empty(shape))
+            rows = trace_listing_rows
+            fixed = (*march_arguments(settings), max_steps, max_distance, ALL_SLIPS)
+            fixed = (*fixed, slabs, hits.fade_px, hits.fade_length)
+        elif settings.tracer == "march":
+            rows = trace_march_rows
+            fixed = (*march_arguments(settings), *fixed)
+        else:
+            rows = trace_rows
+            refine, interval = _REFINES[settings.refinement], _INTERVALS[settings.interval]
+            fixed = (*start, refine, interval, *fixed)
     for row0, row1 in row_chunks(view.height, 1 if progress is None else 32):
-        trace_rows(view, row0, row1, *fixed)
+        rows(view, row0, row1, *fixed, inputs, out)
         if progress is not None:
             progress(row1 / view.height)
     return hits
+
+
+def march_arguments(settings: Settings) -> tuple[Any, ...]:
+    """What only the 3-D march needs to know, in the order of its driver."""
+    assert settings.step is not None
+    growth = march_view.LINEAR if settings.growth == "linear" else march_view.CONSTANT
+    refine = {
+        "none": march_view.NO_REFINE,
+        "bisect": march_view.BISECT,
+        "secant": march_view.SECANT,
+    }[settings.refinement]
+    start = (float(settings.step), growth, settings.jitter, settings.seed)
+    return (*start, refine, settings.refine_steps)
 
 
 def row_chunks(height: int, chunks: int) -> list[tuple[int, int]]:

@@ -1,0 +1,84 @@
+"""A log of one walk: what was read, and what the tracer made of it.
+
+The tracers take a `Log` or None. With None the compiler drops every line that writes, so a trace
+pays nothing for them; with a log the walk is the same, without the loops that only skip misses.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from .._jit import kernel
+from ..typed import F64Array, I64Array
+
+
+class Verdict(IntEnum):
+    """What became of a row, docs/pixel.md."""
+
+    EMPTY = 0
+    IN_FRONT = 1
+    BEHIND = 2
+    SELF_REJECTED = 3
+    BACK_FACE_REJECTED = 4
+    PROPOSED = 5
+    HIT = 6
+    BLOCKED = 7
+
+
+EMPTY, IN_FRONT, PASSED, SELF, BACK_FACE, PROPOSED, HIT, STOPPED = (int(v) for v in Verdict)
+
+COLUMNS = ("level", "s", "x", "y", "start", "end", "depth_start", "depth_end", "front", "back")
+"""Of a row, then the verdict. level: 0 a sample, 1 a cell of a re-walk; x, y: the pixel read; s and
+the interval's start and end in pixels of the major axis; depths and slab in scene units."""
+
+
+class Log(NamedTuple):
+    """Rows of a walk; rows that do not fit are counted and not kept."""
+
+    rows: F64Array  # (n, 11): COLUMNS and the verdict
+    state: I64Array  # (2,): rows written, level of the next one
+
+
+def new_log(room: int) -> Log:
+    """An empty log."""
+    return Log(np.zeros((room, len(COLUMNS) + 1)), np.zeros(2, np.int64))
+
+
+@kernel
+def write(
+    log: Log,
+    s: float,
+    x: int,
+    y: int,
+    a: float,
+    b: float,
+    z_a: float,
+    z_b: float,
+    front: float,
+    back: float,
+    verdict: int,
+) -> None:
+    """Append a row."""
+    n = log.state[0]
+    log.state[0] = n + 1
+    if n < log.rows.shape[0]:
+        log.rows[n, 0] = log.state[1]
+        log.rows[n, 1] = s
+        log.rows[n, 2] = x
+        log.rows[n, 3] = y
+        log.rows[n, 4] = a
+        log.rows[n, 5] = b
+        log.rows[n, 6] = z_a
+        log.rows[n, 7] = z_b
+        log.rows[n, 8] = front
+        log.rows[n, 9] = back
+        log.rows[n, 10] = verdict
+
+
+@kernel
+def refused(flag: int) -> int:
+    """The verdict of a refusal's flag."""
+    return SELF if flag == 2 else BACK_FACE
