@@ -25,11 +25,11 @@ MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 DRACO = "KHR_draco_mesh_compression"
 QUANTIZATION = "KHR_mesh_quantization"
 
-MAX_ZEROS = 2**28
+MAX_ZEROS = 2**26
 """Bytes that a sparse accessor without data beneath may ask for."""
 
-_BUDGET, _BUDGET_PER_BYTE = 2**28, 64
-"""Bytes of accessors read at most: this, and so many times the bytes of the file's buffers."""
+_BUDGET, _BUDGET_PER_BYTE = 2**26, 64
+"""Bytes that accessors become at most: this, and so many times the bytes of the file's buffers."""
 
 _MAX_BUFFERS = 2**31
 """Bytes of all buffers together."""
@@ -87,14 +87,14 @@ class Accessors:
         if "bufferView" in entry:
             offset = gltf.whole(entry, "byteOffset", where, 0)
             values = self._values(entry["bufferView"], offset, count, dtype, width, where)
-            self._spend(size, where)
+            self.spend(4 * count * width, where)
         elif "sparse" in entry:
             if size > MAX_ZEROS:
                 raise gltf.error(
                     f"{where} asks for {size} bytes of zeros; expected at most {MAX_ZEROS}: the "
                     "file is damaged, export it again"
                 )
-            self._spend(size, where)
+            self.spend(4 * count * width, where)
             values = np.zeros((count, width), dtype)
         else:
             raise gltf.error(
@@ -164,13 +164,16 @@ class Accessors:
         out[indices] = values
         return out
 
-    def _spend(self, size: int, where: str) -> None:
-        """Count bytes that are read, since few bytes of JSON can read a buffer many times."""
+    def spend(self, size: int, where: str) -> None:
+        """Count bytes of what is made of the file (4 for each number, whatever it is stored as).
+
+        Few bytes of JSON can read a buffer many times, and one byte can become a triangle.
+        """
         self._read_bytes += size
         budget = _BUDGET + _BUDGET_PER_BYTE * (self._gltf.size + self._buffer_bytes)
         if self._read_bytes > budget:
             raise self._gltf.error(
-                f"{where} brings what accessors read to {self._read_bytes} bytes; expected at most "
+                f"{where} brings what is read to {self._read_bytes} bytes; expected at most "
                 f"{budget} for a file of this size: share accessors less, or split the file"
             )
 

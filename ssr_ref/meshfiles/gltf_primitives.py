@@ -138,6 +138,8 @@ class Primitives:
                 )
             corners = corners.astype(np.int32)
         mode = entry.get("mode", TRIANGLES)
+        if mode in (STRIP, FAN):
+            self._accessors.spend(12 * len(corners), where)  # a triangle for each corner
         if mode == STRIP:
             return _strip(corners)
         if mode == FAN:

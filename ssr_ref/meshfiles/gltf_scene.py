@@ -174,14 +174,16 @@ def _report(
 ) -> LoadReport:
     triangles, degenerate, non_finite = count_triangles(meshes)
     skipped = primitives.counts["points and lines"]
+    replaced = [n for key in _REPLACED for n in _note(primitives.counts[key], *_ODD[key])]
+    otherwise = _note(len(textures.nearest), *_NEAREST)
     return LoadReport(
         format="glTF" if gltf.binary is None else "GLB",
         triangles=triangles,
         degenerate=degenerate,
         non_finite=non_finite,
         skipped=tuple(_note(skipped, "primitive", "primitives", "of points or lines")),
-        fallbacks=tuple(dict.fromkeys(materials.fallbacks)),
-        unsupported=tuple(sorted(_features(gltf, walk, materials, primitives))),
+        fallbacks=(*dict.fromkeys(materials.fallbacks), *replaced),
+        unsupported=(*sorted(_features(gltf, walk, materials, primitives)), *otherwise),
         textures=tuple((image.name, *image.size) for image in textures.images),
     )
 
@@ -218,6 +220,8 @@ _ODD = {
         "no coordinates for a texture: read at (0, 0)",
     ),
 }
+_REPLACED = ("nan colors", "nan uvs")
+_NEAREST = ("texture asks", "textures ask", "for NEAREST filters: drawn bilinear")
 
 
 def _notes(
@@ -229,8 +233,7 @@ def _notes(
     yield from materials.notes
     for name, what in _ODD.items():
         yield from _note(primitives.counts[name], *what)
-    what = ("texture asks", "textures ask", "for NEAREST filters: drawn bilinear")
-    yield from _note(len(textures.nearest), *what)
+    yield from _note(len(textures.nearest), *_NEAREST)
     for name, count in sorted(_features(gltf, walk, materials, primitives).items()):
         one, many, what_is_done = _SPOKEN.get(name, ("", "", ""))
         if one:

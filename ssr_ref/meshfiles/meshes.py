@@ -28,6 +28,10 @@ from .threemf import load_3mf
 MAX_FILE_BYTES = 2**28
 """Largest mesh file, 256 MiB: what is made of it must fit into memory as well."""
 
+MAX_DRAWN = 2**26
+"""Triangles drawn, and vertices placed, instances counted each time: rendering takes 100 bytes for
+each, and a small file can place one mesh as often as it has bytes."""
+
 _DEFAULTS = LoadOptions()
 
 
@@ -55,6 +59,7 @@ def load_mesh(path: str | Path, options: LoadOptions = _DEFAULTS) -> Scene:
         scene = _LOADERS[suffix](path, data, options)
         scene = _with_normals_of_file(scene, options.normals, flat_if_missing=suffix in _GLTF)
         scene = _placed(scene, options)
+        _check_drawn(path, scene)
         scene.world_bounds()  # raises where no vertex is finite
         if scene.report is not None:
             check_strict(path, scene.report, options)
@@ -79,6 +84,18 @@ def _with_clean_words(scene: Scene) -> Scene:
             textures=tuple((one_line(name), w, h) for name, w, h in report.textures),
         )
     return replace(scene, notes=tuple(map(one_line, scene.notes)), report=report)
+
+
+def _check_drawn(path: Path, scene: Scene) -> None:
+    """Raise FileError where instances make more of a scene than can be drawn."""
+    vertices = [sum(len(p.positions) for p in mesh.primitives) for mesh in scene.meshes]
+    placed = max(scene.triangle_count, sum(vertices[node.mesh] for node in scene.nodes))
+    if placed > MAX_DRAWN:
+        raise file_error(
+            path,
+            f"places {placed} triangles or vertices with its instances; expected at most "
+            f"{MAX_DRAWN}: simplify it, or place fewer instances",
+        )
 
 
 def with_normals(scene: Scene, normals: NormalsName) -> Scene:
