@@ -31,7 +31,7 @@ from .hit import (
     refusal,
 )
 from .ray import Ray, depth_at, position_x, position_y
-from .record import EMPTY, HIT, IN_FRONT, PASSED, Log, write
+from .record import EMPTY, HIT, IN_FRONT, PASSED, Log, refused, write
 
 OWN_PIXEL = 0.5
 """s at which a ray has left its own pixel along the major axis."""
@@ -215,7 +215,7 @@ def walk_cells(
     reads = 2 if back.shape[0] > 0 else 1  # of a pixel that is not empty
     walker = start_walk(ray, x, y, x_last, y_last, a, b)
     move = skip_first
-    refused = 0
+    refusals = 0
     hit = no_hit()
     while True:
         walker = next_candidate(
@@ -244,9 +244,9 @@ def walk_cells(
             slab = load_slab(slabs, depth, back, x, y)
             hit = locate_hit(rules, ray, slab, x, y, walker.entry, walker.leave, True)
             break
-        refused |= why_not
+        refusals |= why_not
         move = True
-    flags = refused
+    flags = refusals
     flags |= OVER_EMPTY if walker.empty > 0 else 0
     flags |= PASSED_BEHIND if walker.behind > 0 else 0
     fetches = walker.cells * reads - walker.empty * (reads - 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import prange
@@ -142,6 +142,16 @@ def trace_rows(
             close_pixel(out, x, y, ray, walk)
 
 
+class Prepared(NamedTuple):
+    """What a trace runs: the driver of rows, its settings, the images it reads and writes."""
+
+    rows: Any
+    fixed: tuple[Any, ...]
+    inputs: Inputs
+    out: Outputs
+    hits: HitBuffer
+
+
 def trace(
     view: ViewParams,
     gbuffer: GBuffer,
@@ -154,6 +164,16 @@ def trace(
     "back_faces". settings must be resolved (no length None). progress is called with the share
     of rows done.
     """
+    prepared = prepare(view, gbuffer, settings)
+    for row0, row1 in row_chunks(view.height, 1 if progress is None else 32):
+        prepared.rows(view, row0, row1, *prepared.fixed, prepared.inputs, prepared.out)
+        if progress is not None:
+            progress(row1 / view.height)
+    return prepared.hits
+
+
+def prepare(view: ViewParams, gbuffer: GBuffer, settings: Settings) -> Prepared:
+    """Slabs or planes of every pixel, empty outputs, and the driver for these settings."""
     if settings.thickness is None or settings.max_distance is None:
         raise SettingsError("thickness or max_distance is None; expected Settings.resolved(radius)")
     if settings.tracer == "march" and settings.step is None:
@@ -219,11 +239,7 @@ def trace(
             rows = trace_rows
             refine, interval = _REFINES[settings.refinement], _INTERVALS[settings.interval]
             fixed = (*start, refine, interval, *fixed)
-    for row0, row1 in row_chunks(view.height, 1 if progress is None else 32):
-        rows(view, row0, row1, *fixed, inputs, out)
-        if progress is not None:
-            progress(row1 / view.height)
-    return hits
+    return Prepared(rows, fixed, inputs, out, hits)
 
 
 def march_arguments(settings: Settings) -> tuple[Any, ...]:
