@@ -96,10 +96,15 @@ class Findings:
             ("replaced", self.fallbacks),
             ("not drawn as the file says", self.unsupported),
         ):
-            out += [f"{kind}: {line}" for line in lines[:MAX_NOTES]]
-            if len(lines) > MAX_NOTES:
-                out.append(f"{kind}: {len(lines) - MAX_NOTES} more, see the load report")
+            out += first_notes([f"{kind}: {line}" for line in lines], kind)
         return (*out, *self.remarks)
+
+
+def first_notes(lines: Sequence[str], kind: str) -> list[str]:
+    """The first MAX_NOTES of notes of a kind, and how many more there are."""
+    more = len(lines) - MAX_NOTES
+    rest = [f"{kind}: {more} more, see the load report"] if more > 0 else []
+    return [*lines[:MAX_NOTES], *rest]
 
 
 class Attributes(NamedTuple):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import SceneError
 from ..scene import LoadReport, Mesh, Node, Scene
-from .building import file_error
+from .building import MAX_NOTES, file_error, first_notes
 from .census import count_triangles
 from .gltf_accessors import DRACO, MESHOPT, QUANTIZATION, Accessors
 from .gltf_json import Gltf, read_gltf
@@ -230,16 +230,19 @@ def _notes(
     scenes = scene_names(gltf)
     if len(scenes) > 1:
         yield f"{len(scenes)} scenes: '{scenes[scene_index(gltf) or 0]}' is drawn"
-    yield from materials.notes
+    yield from first_notes(materials.notes, "replaced")
     for name, what in _ODD.items():
         yield from _note(primitives.counts[name], *what)
     yield from _note(len(textures.nearest), *_NEAREST)
+    others = 0
     for name, count in sorted(_features(gltf, walk, materials, primitives).items()):
-        one, many, what_is_done = _SPOKEN.get(name, ("", "", ""))
-        if one:
-            yield from _note(count, one, many, what_is_done)
+        if name in _SPOKEN:
+            yield from _note(count, *_SPOKEN[name])
         else:
-            yield f"{name} is not drawn"
+            others += 1
+            if others <= MAX_NOTES:
+                yield f"{name} is not drawn"
+    yield from _note(max(0, others - MAX_NOTES), "feature is", "features are", "not drawn either")
 
 
 def _note(count: int, one: str, many: str, what: str) -> Iterator[str]:

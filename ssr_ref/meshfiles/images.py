@@ -30,6 +30,9 @@ _MOST_INFLATED = 1032
 _SLOW_TEXELS, _SLOW_TEXELS_PER_BYTE = 2**22, 64
 """Texels that pypng may make (2 µs each): this, and so many times the bytes of the file."""
 
+_FREE_BYTES, _BYTES_PER_BYTE = 2**26, 256
+"""Bytes that any image may decode to (4096 × 4096 of 8 bits), and above it, for each of its own."""
+
 _STORED = 65535
 """Most bytes of one stored DEFLATE block (RFC 1951, section 3.2.4)."""
 
@@ -67,6 +70,21 @@ def image_error(name: str, found: str, expected: str) -> FileError:
     return FileError(" ".join(f"image '{name}' {found}; expected {expected}".split()))
 
 
+def _check_size(name: str, data: bytes, width: int, height: int, texel: int) -> None:
+    """Refuse, by its header, an image that is too large, or far larger than its file."""
+    try:
+        check_image_size(name, width, height)
+    except SceneError as error:
+        raise FileError(" ".join(str(error).split())) from None
+    most = max(_FREE_BYTES, _BYTES_PER_BYTE * len(data))
+    if width * height * texel > most:
+        raise image_error(
+            name,
+            f"decodes to {width * height * texel} bytes from {len(data)}",
+            f"at most {most}: it may be an image bomb, scale it down",
+        )
+
+
 def _check_room(name: str, width: int, height: int, texel: int, room: int | None) -> None:
     if room is not None and width * height * texel > room:
         raise NoRoomError(
@@ -80,10 +98,7 @@ def _read_png(name: str, data: bytes, room: int | None) -> AnyArray:
     if len(data) < 33 or data[12:16] != b"IHDR":
         raise image_error(name, "has no PNG header", "a valid PNG file: export it again")
     width, height, depth, color = struct.unpack(">IIBB", data[16:26])
-    try:
-        check_image_size(name, width, height)
-    except SceneError as error:
-        raise FileError(" ".join(str(error).split())) from None
+    _check_size(name, data, width, height, 8 if depth == 16 else 4)
     _check_room(name, width, height, 8 if depth == 16 else 4, room)
     if width * height * depth > 8 * _MOST_INFLATED * len(data):
         raise image_error(
@@ -161,7 +176,7 @@ def _through_pillow(name: str, data: bytes, kind: str, room: int | None) -> AnyA
                 with PillowImage.open(io.BytesIO(data), formats=(kind,)) as file:
                     file.verify()  # the chunks' checksums, which decoding alone passes over
             with PillowImage.open(io.BytesIO(data), formats=(kind,)) as file:
-                check_image_size(name, *file.size)
+                _check_size(name, data, *file.size, 4)
                 _check_room(name, *file.size, 4, room)
                 # The second picture of a stereo JPEG is no animation: the first is the image.
                 if kind != "JPEG" and getattr(file, "is_animated", False):
@@ -169,8 +184,6 @@ def _through_pillow(name: str, data: bytes, kind: str, room: int | None) -> AnyA
                 if file.mode not in ("1", "L", "LA", "P", "RGB", "RGBA", "RGBX"):
                     raise image_error(name, f"is {kind} in {file.mode}", "grey or RGB: convert it")
                 return np.asarray(file.convert("RGBA"))
-    except SceneError as error:
-        raise FileError(" ".join(str(error).split())) from None
     except FileError:
         raise
     except PillowImage.DecompressionBombError:
@@ -199,10 +212,7 @@ def _check_webp(name: str, data: bytes) -> None:
         width, height = (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1
     else:
         width, height = (v & 0x3FFF for v in struct.unpack("<HH", head[14:18]))
-    try:
-        check_image_size(name, width, height)
-    except SceneError as error:
-        raise FileError(" ".join(str(error).split())) from None
+    _check_size(name, data, width, height, 4)
 
 
 def png_bytes(image: Image) -> bytes:

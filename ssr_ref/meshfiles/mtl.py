@@ -27,7 +27,7 @@ from ..texture import Image, Texture
 from ..typed import Rgb
 from .beside import read_beside
 from .building import WHITE, Findings, without_path
-from .mtl_maps import Map, MapImages, is_number, parse_statement
+from .mtl_maps import Map, MapImages, is_number, parse_statement, plain_reference
 from .options import LoadOptions
 
 Plane: TypeAlias = tuple[int, int] | None
@@ -51,6 +51,7 @@ class MtlLibrary:
         self._options = options
         self._findings = findings
         self._entries: dict[str, dict[str, str]] = {}
+        self._read: set[str] = set()
         self._made: dict[tuple[str, bool], Material | None] = {}
         for rest in dict.fromkeys(libraries):
             for text in self._texts(rest):
@@ -66,8 +67,12 @@ class MtlLibrary:
         found = []
         names = [rest] if _exists(self._path, rest) else rest.split() or [rest]
         for name in names:
+            reference = plain_reference(name)
+            if reference in self._read:
+                continue
+            self._read.add(reference)
             try:
-                data = read_beside(self._path, name.replace("\\", "/"), self._options)
+                data = read_beside(self._path, reference, self._options)
             except FileError as error:
                 self._fall_back("materials", f"mtllib {without_path(self._path, error)}")
                 continue

@@ -93,7 +93,7 @@ def parse_statement(rest: str) -> Statement:
     if any(vectors["-t"]):
         ignored["-t"] = None
     return Statement(
-        " ".join(words[i:]).strip('"').replace("\\", "/"),
+        plain_reference(" ".join(words[i:]).strip('"')),
         wrap,
         (vectors["-o"][0], vectors["-o"][1]),
         (vectors["-s"][0], vectors["-s"][1]),
@@ -162,6 +162,16 @@ class MapImages:
             image = Image(" + ".join(names), pixels if wide else pixels.astype(np.uint8))
             self._packed[key] = self._add(image)
         return self._packed[key]
+
+
+def plain_reference(name: str) -> str:
+    """The name with slashes and without "." and empty parts, so that a file has one name.
+
+    The same file under many names would be read many times.
+    """
+    name = name.replace("\\", "/")
+    root = name[: len(name) - len(name.lstrip("/"))]
+    return root + "/".join(part for part in name.split("/") if part not in ("", "."))
 
 
 def is_number(word: str) -> bool:
