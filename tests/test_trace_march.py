@@ -691,3 +691,13 @@ def test_the_listing_with_all_slips_is_what_the_setting_runs(projection: str) ->
             assert out.fade_length[y, x] == want.fade_length
     hit = out.status == Status.HIT
     assert (out.hit_px[hit] >= 0.0).all() and (out.hit_px[hit] < SIZE).all()
+
+
+def test_a_listed_hit_has_no_end() -> None:
+    """A ray that leaves the image within its own pixel is walked all the same, and hits there."""
+    view = front_view(False)
+    g = one_ray(view, 0, 15, 2.0, (-1.0, 0.0, -1.0))
+    kw = {"max_steps": 9, **FIXED}
+    assert traced(view, g, **kw).end[15, 0] == End.LEFT_SCREEN_L
+    out = traced(view, g, listing=True, **kw)
+    assert (out.status[15, 0], out.end[15, 0], out.steps[15, 0]) == (Status.HIT, 0, 1)

@@ -136,6 +136,9 @@ def test_condition_numbers_of_known_functions() -> None:
         condition_number(lambda a: [mpf(a[0]), 2 * mpf(a[0]) - a[1]], [3.0, 5.0], g) for g in both
     ]
     assert values == [11.0, 3.7]
+    # The larger side of a kink counts for a vector too: (2, 0) on the left moves twice as far.
+    kink = lambda a: [mpf(a[0]) * (2 if mpf(a[0]) < 1 else 1) - (mpf(a[0]) < 1), mpf(0)]  # noqa: E731
+    assert condition_number(kink, [1.0], [(slice(0, 2), "norm")]) == 2.0
     # A choice that flips on one side only leaves the other; on both sides there is no derivative.
     step = lambda a: [int(mpf(a[0]) >= 1), mpf(a[0]) * (7 if mpf(a[0]) >= 1 else 1)]  # noqa: E731
     groups = [(slice(0, 1), "exact"), (slice(1, 2), "component")]
@@ -245,6 +248,19 @@ def test_a_broken_kernel_fails_them(sets: dict[str, VectorSet], name: str) -> No
             assert len(failed) > 10, (field.name, len(failed))
 
 
+def test_a_tolerance_is_the_last_error_that_passes(sets: dict[str, VectorSet]) -> None:
+    """One case off by exactly its tolerance passes, by an ulp more it fails, and alone."""
+    vectors = sets["srgb_decode"]
+    i, want = vectors.names.index("half"), vectors.outputs["float64"]["linear"]
+    ulp, tolerance = FLOAT64.ulp(float(want[i])), vectors.tolerance["float64"][i]
+    for more, failed in ((0.0, ()), (1.0, ("half",))):
+        got = want.copy()
+        got[i] += (tolerance + more) * ulp
+        finding = check(replaced(vectors, lambda got=got: [got]))
+        assert finding.failed == failed and finding.worst_case == "half"
+        assert finding.worst_ulp == tolerance + more
+
+
 def replaced(vectors: VectorSet, results: Callable[[], list[Any]]) -> VectorSet:
     """The set with a stand-in for the kernel that returns what it is told."""
     subject = replace(vectors.subject, call=lambda function, *arrays: results())
@@ -321,6 +337,7 @@ def test_json_fits_the_schema_beside_it(folder: Path, name: str) -> None:
     schema = json.loads((folder / "schema.json").read_text())
     data = json.loads((folder / f"{name}.json").read_text())
     data["cases"] = data["cases"][::5]
+    assert list(data) == sorted(data) and all(list(c) == sorted(c) for c in data["cases"])
     conforms(data, schema, schema)
     for broken in (
         {**data, "extra": 1},
