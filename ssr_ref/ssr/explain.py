@@ -16,14 +16,11 @@ from ..camera import ViewParams
 from ..errors import SettingsError
 from ..settings import Settings
 from ..typed import F64Array
-from ..vecmath.noise import jitter
 from .hit import SlabRules
-from .march_cells import march_cells
-from .march_dda import march_dda
-from .march_planes import march_plane_cells, march_plane_samples, march_plane_strides
 from .record import COLUMNS, Log, Verdict, new_log
-from .rows import CELLS, DDA, Inputs, Outputs, close_pixel, open_pixel
-from .trace import prepare
+from .rows import Inputs, Outputs, close_pixel, open_pixel
+from .trace import prepare, walk_slabs
+from .trace_planes import walk_planes
 
 ROOM = 4096
 """Rows that are kept at first; a longer walk is recorded again with room for all."""
@@ -78,29 +75,24 @@ def record_slab_pixel(
 ) -> None:
     """As `trace_rows` does for one pixel, with a log."""
     rules = SlabRules(thickness, bias, rounding, reject_self, facing_test)
-    depth, back, normal = inputs.depth, inputs.back, inputs.geo_normal
     walks, ray = open_pixel(view, inputs, out, x, y, max_distance)
     if not walks:
         return
-    if tracer == DDA:
-        offset = jitter(x, y, seed) if jittered else 1.0
-        walk = march_dda(
-            view,
-            rules,
-            slabs,
-            depth,
-            back,
-            normal,
-            ray,
-            stride,
-            offset,
-            refine,
-            interval,
-            max_steps,
-            log,
-        )
-    else:
-        walk = march_cells(view, rules, slabs, depth, back, normal, ray, max_steps, log)
+    walk = walk_slabs(
+        view,
+        rules,
+        slabs,
+        inputs,
+        ray,
+        tracer,
+        stride,
+        jittered,
+        seed,
+        refine,
+        interval,
+        max_steps,
+        log,
+    )
     close_pixel(out, x, y, ray, walk)
 
 
@@ -126,21 +118,12 @@ def record_plane_pixel(
 ) -> None:
     """As `trace_plane_rows` does for one pixel, with a log."""
     rules = SlabRules(thickness, 0.0, rounding, reject_self, facing_test)
-    depth, back, normal = inputs.depth, inputs.back, inputs.geo_normal
     walks, ray = open_pixel(view, inputs, out, x, y, max_distance)
     if not walks:
         return
-    offset = jitter(x, y, seed) if jittered else 1.0
-    if tracer == CELLS:
-        walk = march_plane_cells(view, rules, planes, depth, back, normal, ray, max_steps, log)
-    elif stride == 1:
-        walk = march_plane_samples(
-            view, rules, planes, depth, back, normal, ray, offset, max_steps, log
-        )
-    else:
-        walk = march_plane_strides(
-            view, rules, planes, depth, back, normal, ray, stride, offset, max_steps, log
-        )
+    walk = walk_planes(
+        view, rules, planes, inputs, ray, tracer, stride, jittered, seed, max_steps, log
+    )
     close_pixel(out, x, y, ray, walk)
 
 

@@ -85,28 +85,6 @@ def plane_hit(ray: Ray, plane: Plane, back: FloatArray, x: int, y: int, s: float
 
 
 @kernel
-def verdict_of(
-    view: ViewParams,
-    rules: SlabRules,
-    depth: FloatArray,
-    back: FloatArray,
-    normal: FloatArray,
-    ray: Ray,
-    x: int,
-    y: int,
-    verdict: Meeting,
-) -> int:
-    """What a log says of a meeting."""
-    if verdict.what == BLOCKED and not is_open(back, x, y):
-        return STOPPED
-    if verdict.what == MET:
-        z_front = np.float64(depth[y, x])
-        why_not = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
-        return HIT if why_not == 0 else refused(why_not)
-    return PASSED if verdict.behind else IN_FRONT
-
-
-@kernel
 def write_plane(
     log: Log, ray: Ray, plane: Plane, x: int, y: int, s: float, a: float, b: float, what: int
 ) -> None:
@@ -117,6 +95,66 @@ def write_plane(
         front = depth_of(ray.perspective, w)
         z_back = depth_of(ray.perspective, plane.back)
     write(log, s, x, y, a, b, depth_at(ray, a), depth_at(ray, b), front, z_back, what)
+
+
+class Tried(NamedTuple):
+    """What the test of one pixel came to: a hit, or BLOCKED, or neither."""
+
+    hit: Hit
+    blocked: bool
+    free: bool  # as in `Meeting`
+    flags: int
+    fetches: int
+
+
+@kernel
+def try_plane(
+    view: ViewParams,
+    rules: SlabRules,
+    planes: F64Array,
+    depth: FloatArray,
+    back: FloatArray,
+    normal: FloatArray,
+    ray: Ray,
+    x: int,
+    y: int,
+    s: float,
+    before: float,
+    a: float,
+    b: float,
+    free: bool,
+    log: Log | None,
+) -> Tried:
+    """Test pixel (x, y), read at s, over a ≤ s ≤ b; `before`: where the segment before begins."""
+    plane = load_plane(planes, x, y)
+    hit = no_hit()
+    blocked = False
+    flags = 0
+    fetches = 1
+    what = EMPTY
+    if plane.w == -np.inf:
+        flags = OVER_EMPTY
+        free = True
+    else:
+        fetches = 2 if back.shape[0] > 0 else 1
+        meeting = meet_plane(plane, ray, before, a, b, free)
+        free = meeting.free
+        what = IN_FRONT
+        if meeting.what == MET:
+            z_front = np.float64(depth[y, x])
+            flags = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
+            if flags == 0:
+                hit = plane_hit(ray, plane, back, x, y, meeting.s)
+            what = HIT if flags == 0 else refused(flags)
+        elif meeting.what == BLOCKED and not is_open(back, x, y):
+            blocked = True
+            what = STOPPED
+        elif meeting.behind:
+            flags = PASSED_BEHIND
+            what = PASSED
+    if log is not None:
+        write_plane(log, ray, plane, x, y, s, a, b, what)
+    return Tried(hit, blocked, free, flags, fetches)
 
 
 @kernel
@@ -151,7 +189,6 @@ def walk_plane_cells(
     left_y = max(0, (y_last - y) * step_y) if ray.dp_y != 0.0 else 0
     s_x = crossing(x + ahead_x, ray.p0_x, ray.dp_x) if left_x > 0 else np.inf
     s_y = crossing(y + ahead_y, ray.p0_y, ray.dp_y) if left_y > 0 else np.inf
-    reads = 2 if back.shape[0] > 0 else 1
     flags = 0
     cells = 0
     fetches = 0
@@ -177,31 +214,28 @@ def walk_plane_cells(
         if cells == max_cells:
             return CellWalk(no_hit(), flags, cells, fetches, True, False)
         cells += 1
-        plane = load_plane(planes, x, y)
-        if plane.w == -np.inf:
-            flags |= OVER_EMPTY
-            fetches += 1
-            free = True
-            if log is not None:
-                write_plane(log, ray, plane, x, y, entry, entry, leave, EMPTY)
-            continue
-        fetches += reads
-        verdict = meet_plane(plane, ray, before, entry, leave, free)
-        free = verdict.free
-        if log is not None:
-            what = verdict_of(view, rules, depth, back, normal, ray, x, y, verdict)
-            write_plane(log, ray, plane, x, y, entry, entry, leave, what)
-        if verdict.what == BLOCKED and not is_open(back, x, y):
-            return CellWalk(no_hit(), flags, cells, fetches, False, True)
-        if verdict.what == MET:
-            z_front = np.float64(depth[y, x])
-            why_not = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
-            if why_not == 0:
-                hit = plane_hit(ray, plane, back, x, y, verdict.s)
-                return CellWalk(hit, flags, cells, fetches, False, False)
-            flags |= why_not
-        elif verdict.behind:
-            flags |= PASSED_BEHIND
+        tried = try_plane(
+            view,
+            rules,
+            planes,
+            depth,
+            back,
+            normal,
+            ray,
+            x,
+            y,
+            entry,
+            before,
+            entry,
+            leave,
+            free,
+            log,
+        )
+        free = tried.free
+        flags |= tried.flags
+        fetches += tried.fetches
+        if tried.hit.found or tried.blocked:
+            return CellWalk(tried.hit, flags, cells, fetches, False, tried.blocked)
     return CellWalk(no_hit(), flags, cells, fetches, False, False)
 
 
@@ -311,7 +345,6 @@ def march_plane_samples(
     The sample's interval is tested against the pixel's plane, extended back over the interval
     before.
     """
-    reads = 2 if back.shape[0] > 0 else 1
     first = 0 if offset > OWN_PIXEL else 1
     i = first
     flags = 0
@@ -331,31 +364,14 @@ def march_plane_samples(
             return CellWalk(no_hit(), flags, i - first, fetches, True, False)
         x, y = np.int64(position_x(ray, s)), np.int64(position_y(ray, s))
         i += 1
-        plane = load_plane(planes, x, y)
-        if plane.w == -np.inf:
-            flags |= OVER_EMPTY
-            fetches += 1
-            free = True
-            if log is not None:
-                write_plane(log, ray, plane, x, y, s, a, b, EMPTY)
-        else:
-            fetches += reads
-            verdict = meet_plane(plane, ray, before, a, b, free)
-            free = verdict.free
-            if log is not None:
-                what = verdict_of(view, rules, depth, back, normal, ray, x, y, verdict)
-                write_plane(log, ray, plane, x, y, s, a, b, what)
-            if verdict.what == BLOCKED and not is_open(back, x, y):
-                return CellWalk(no_hit(), flags, i - first, fetches, False, True)
-            if verdict.what == MET:
-                z_front = np.float64(depth[y, x])
-                why_not = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
-                if why_not == 0:
-                    hit = plane_hit(ray, plane, back, x, y, verdict.s)
-                    return CellWalk(hit, flags, i - first, fetches, False, False)
-                flags |= why_not
-            elif verdict.behind:
-                flags |= PASSED_BEHIND
+        tried = try_plane(
+            view, rules, planes, depth, back, normal, ray, x, y, s, before, a, b, free, log
+        )
+        free = tried.free
+        flags |= tried.flags
+        fetches += tried.fetches
+        if tried.hit.found or tried.blocked:
+            return CellWalk(tried.hit, flags, i - first, fetches, False, tried.blocked)
         before, a = a, b
     return CellWalk(no_hit(), flags, i - first, fetches, False, False)
 
@@ -402,21 +418,21 @@ def march_plane_strides(
         x, y = np.int64(position_x(ray, s)), np.int64(position_y(ray, s))
         plane = load_plane(planes, x, y)
         propose = i == first
+        what = EMPTY
         i += 1
         if plane.w == -np.inf:
             flags |= OVER_EMPTY
             fetches += 1
         else:
             fetches += reads
+            what = IN_FRONT
             if behind_by(plane, ray, b) >= 0.0:
+                what = PASSED
                 if max(ray_nearness(ray, a), ray_nearness(ray, b)) >= plane.back:
                     propose = True
                 else:
                     flags |= PASSED_BEHIND
         if log is not None:
-            what = EMPTY if plane.w == -np.inf else IN_FRONT
-            if plane.w > -np.inf and behind_by(plane, ray, b) >= 0.0:
-                what = PASSED
             write_plane(log, ray, plane, x, y, s, a, b, PROPOSED if propose else what)
         if propose:
             walk = rewalk_planes(view, rules, planes, depth, back, normal, ray, a, b, log)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import kernel
+from ..buffers import Flag
 from ..typed import F64Array, I64Array
 
 
@@ -28,6 +29,7 @@ class Verdict(IntEnum):
     BLOCKED = 7
 
 
+SELF_FLAG = int(Flag.SELF_REJECTED)
 EMPTY, IN_FRONT, PASSED, SELF, BACK_FACE, PROPOSED, HIT, STOPPED = (int(v) for v in Verdict)
 
 COLUMNS = ("level", "s", "x", "y", "start", "end", "depth_start", "depth_end", "front", "back")
@@ -81,4 +83,4 @@ def write(
 @kernel
 def refused(flag: int) -> int:
     """The verdict of a refusal's flag."""
-    return SELF if flag == 2 else BACK_FACE
+    return SELF if flag == SELF_FLAG else BACK_FACE

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import prange
 
-from .._jit import driver
+from .._jit import driver, inlined
 from ..buffers import GBuffer, HitBuffer
 from ..camera import ViewParams, ray_through
 from ..errors import SettingsError
@@ -20,7 +20,7 @@ from ..vecmath.vec import dot
 from . import march_view
 from .hit import SlabRules, load3
 from .listing_march import ALL_SLIPS, trace_listing_rows
-from .march_cells import march_cells
+from .march_cells import CellWalk, march_cells
 from .march_dda import (
     BISECT,
     CELL,
@@ -32,6 +32,8 @@ from .march_dda import (
     march_dda,
 )
 from .planes import gradient, prepare_planes
+from .ray import Ray
+from .record import Log
 from .rows import CELLS, DDA, Inputs, Outputs, close_pixel, open_pixel
 from .trace_march import trace_march_rows
 from .trace_planes import trace_plane_rows
@@ -88,6 +90,44 @@ def prepare_slabs(
             slabs[y, x, 1] = z_back
 
 
+@inlined
+def walk_slabs(
+    view: ViewParams,
+    rules: SlabRules,
+    slabs: F64Array,
+    inputs: Inputs,
+    ray: Ray,
+    tracer: int,
+    stride: int,
+    jittered: bool,
+    seed: int,
+    refine: int,
+    interval: int,
+    max_steps: int,
+    log: Log | None,
+) -> CellWalk:
+    """Walk a ray through constant-depth pixels by the tracer that is asked for."""
+    depth, back, normal = inputs.depth, inputs.back, inputs.geo_normal
+    if tracer == CELLS:
+        return march_cells(view, rules, slabs, depth, back, normal, ray, max_steps, log)
+    offset = jitter(ray.x, ray.y, seed) if jittered else 1.0
+    return march_dda(
+        view,
+        rules,
+        slabs,
+        depth,
+        back,
+        normal,
+        ray,
+        stride,
+        offset,
+        refine,
+        interval,
+        max_steps,
+        log,
+    )
+
+
 @driver()
 def trace_rows(
     view: ViewParams,
@@ -113,32 +153,25 @@ def trace_rows(
     """Trace rows row0 to row1 − 1; each pixel writes only its own outputs."""
     for y in prange(row0, row1):
         rules = SlabRules(thickness, bias, rounding, reject_self, facing_test)
-        depth, back, geo_normal = inputs.depth, inputs.back, inputs.geo_normal
         for x in range(view.width):
             walks, ray = open_pixel(view, inputs, out, x, y, max_distance)
             if not walks:
                 continue
-            if tracer == DDA:
-                offset = jitter(x, y, seed) if jittered else 1.0
-                walk = march_dda(
-                    view,
-                    rules,
-                    slabs,
-                    depth,
-                    back,
-                    geo_normal,
-                    ray,
-                    stride,
-                    offset,
-                    refine,
-                    interval,
-                    max_steps,
-                    None,
-                )
-            else:
-                walk = march_cells(
-                    view, rules, slabs, depth, back, geo_normal, ray, max_steps, None
-                )
+            walk = walk_slabs(
+                view,
+                rules,
+                slabs,
+                inputs,
+                ray,
+                tracer,
+                stride,
+                jittered,
+                seed,
+                refine,
+                interval,
+                max_steps,
+                None,
+            )
             close_pixel(out, x, y, ray, walk)
 
 
