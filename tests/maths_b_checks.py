@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ssr_ref.maths.registry import KernelInfo
-from ssr_ref.study.oracle_maps import CONDITIONS, ORACLES, mp
+from ssr_ref.study.accuracy import case, errors
 from ssr_ref.study.sampling_maps import SAMPLES
 
 U = 2.0**-53
@@ -31,43 +31,16 @@ ENDS = {
 }
 
 
-def key_of(info: KernelInfo) -> str:
-    return f"{info.name}/{info.form}" if info.form else info.name
-
-
 def infos(module: ModuleType) -> dict[str, KernelInfo]:
-    return {key_of(info): info for info in module.KERNELS}
+    return {info.key: info for info in module.KERNELS}
 
 
-def error_of(key: str, measure: str, got: Any, args: list[Any]) -> float:
-    """Error of one case in 2⁻⁵³ of the measure, over 1 + its condition number."""
-    exact = ORACLES[key](*args)
-    off = [abs(mp.mpf(float(g)) - e) for g, e in zip(got, exact, strict=True)]
-    if key == "latlong_uv":  # u is an angle: modulo 1
-        off[0] = min(off[0], 1 - off[0])
-    if measure == "norm":
-        error = mp.norm(off) / mp.norm(exact)
-    else:
-        error = max(
-            (d / abs(e) if e != 0 else (mp.mpf(0) if d == 0 else mp.inf))
-            for d, e in zip(off, exact)
-        )
-    error /= U * (1 + CONDITIONS.get(key, lambda *_: 0)(*args))
-    return float("inf") if mp.isnan(error) else float(error)
-
-
-def worst_error(info: KernelInfo, inputs: tuple[Any, ...]) -> tuple[float, list[Any]]:
-    """Largest `error_of` over the cases, and its arguments."""
-    n = inputs[0].shape[0]
+def worst_error(info: KernelInfo, inputs: tuple[Any, ...]) -> tuple[float, tuple[Any, ...]]:
+    """The largest of `accuracy.errors` over the cases, and its arguments."""
     with np.errstate(all="ignore"):
-        got = np.asarray(info.function(*inputs)).reshape(n, -1)
-    found: tuple[float, list[Any]] = (-1.0, [])
-    for i in range(n):
-        args = [a[i].tolist() for a in inputs]
-        error = error_of(key_of(info), info.measure, got[i], args)
-        if not error <= found[0]:
-            found = (error, args)
-    return found
+        found = errors(info, inputs)
+    worst = int(np.argmax(found))
+    return float(found[worst]), case(inputs, worst)
 
 
 def accuracy(module: ModuleType, key: str, n: int = 400, seed: int = 11) -> None:

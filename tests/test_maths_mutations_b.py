@@ -6,9 +6,8 @@ check is the very one that the real modules pass in test_maths_{depth,barycentri
 
 from __future__ import annotations
 
+import contextlib
 import importlib
-import inspect
-import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from types import ModuleType
@@ -17,64 +16,21 @@ import maths_b_checks as checks
 import maths_direction_checks as sky
 import numpy as np
 import pytest
+from mutants import mutant
 
-from ssr_ref import _jit
 from ssr_ref.study.sampling_maps import SAMPLES
 
-ELEMENTARY = "ssr_ref.vecmath.elementary"
-CHAINS = {  # the kernels' modules below each module of public functions, lowest first
-    "ssr_ref.maths.depth": [
-        ELEMENTARY, "ssr_ref.depth.logarithmic", "ssr_ref.depth.formats", "ssr_ref.depth.storage",
-    ],
-    "ssr_ref.maths.barycentric": ["ssr_ref.vecmath.exact", "ssr_ref.vecmath.barycentric"],
-    "ssr_ref.maths.directions": [
-        ELEMENTARY, "ssr_ref.vecmath.exact", "ssr_ref.vecmath.vec", "ssr_ref.vecmath.directions",
-    ],
-}  # fmt: skip
+PUBLIC = ("ssr_ref.maths.depth", "ssr_ref.maths.barycentric", "ssr_ref.maths.directions")
 
 
-def _interpreted(
-    name: str, edit: tuple[str, str] | None, below: dict[str, ModuleType]
-) -> ModuleType:
-    """A module's source, changed, with plain Python for compiled code."""
-    original = importlib.import_module(name)
-    source = inspect.getsource(original)
-    if edit is not None:
-        assert source.count(edit[0]) == 1, f"{edit[0]!r} stands {source.count(edit[0])} times"
-        source = source.replace(*edit)
-    plain = ModuleType("ssr_ref._jit")
-    plain.kernel = plain.inlined = lambda function: function  # type: ignore[attr-defined]
-    plain.driver = lambda parallel=True: lambda function: function  # type: ignore[attr-defined]
-    plain.fma = _jit._fma_exact  # type: ignore[attr-defined]
-    module = ModuleType(name)
-    module.__package__ = name.rpartition(".")[0]
-    kept = sys.modules["ssr_ref._jit"]
-    sys.modules["ssr_ref._jit"] = plain
-    try:
-        exec(compile(source, f"<{name}, broken>", "exec"), module.__dict__)
-    finally:
-        sys.modules["ssr_ref._jit"] = kept
-    for lower in below.values():
-        compiled = importlib.import_module(lower.__name__)
-        for key, value in list(vars(module).items()):
-            if value is compiled:
-                setattr(module, key, lower)
-            elif callable(value):
-                for other, theirs in vars(compiled).items():
-                    if theirs is value:
-                        setattr(module, key, getattr(lower, other))
-    return module
+@contextlib.contextmanager
+def broken(public: str, where: str = "", edit: tuple[str, str] = ("", "")) -> Iterator[ModuleType]:
+    """A public module of an interpreted copy of the package, `edit` made in `where`."""
+    with mutant(where.removeprefix("ssr_ref."), *edit):
+        yield importlib.import_module(public)
 
 
-def broken(public: str, where: str, edit: tuple[str, str] | None) -> ModuleType:
-    """The public module on top of its kernels, `edit` made in `where`."""
-    below: dict[str, ModuleType] = {}
-    for name in [*CHAINS[public], public]:
-        below[name] = _interpreted(name, edit if name == where else None, below)
-    return below[public]
-
-
-DEPTH, BARY, DIRS = CHAINS
+DEPTH, BARY, DIRS = PUBLIC
 FORMATS, LOG, STORAGE = (f"ssr_ref.depth.{n}" for n in ("formats", "logarithmic", "storage"))
 BARY_K, DIRS_K = "ssr_ref.vecmath.barycentric", "ssr_ref.vecmath.directions"
 
@@ -211,32 +167,26 @@ MUTATIONS = {
 }  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
-
-
 @pytest.mark.parametrize("name", MUTATIONS)
 def test_broken_formula_is_caught(name: str) -> None:
     public, where, old, new, check = MUTATIONS[name]
-    module = broken(public, where, (old, new))
-    with pytest.raises(AssertionError):
+    with broken(public, where, (old, new)) as module, pytest.raises(AssertionError):
         check(module)
 
 
-@pytest.mark.parametrize("public", CHAINS)
+@pytest.mark.parametrize("public", PUBLIC)
 def test_unbroken_source_passes_the_same_checks(public: str) -> None:
     """Interpreted and unchanged: what fails above fails because of its change alone."""
-    module = broken(public, "", None)
-    for check in {row[4] for row in MUTATIONS.values() if row[0] == public}:
-        check(module)
+    with broken(public) as module:
+        for check in {row[4] for row in MUTATIONS.values() if row[0] == public}:
+            check(module)
 
 
-@pytest.mark.parametrize("public", CHAINS)
+@pytest.mark.parametrize("public", PUBLIC)
 def test_compiled_and_interpreted_give_the_same_bytes(public: str) -> None:
-    plain = checks.infos(broken(public, "", None))
-    for key, info in checks.infos(importlib.import_module(public)).items():
-        inputs = SAMPLES[key](60, 41)
-        compiled, interpreted = info.function(*inputs), plain[key].function(*inputs)
-        assert compiled.tobytes() == interpreted.tobytes(), key
+    compiled = checks.infos(importlib.import_module(public))
+    with broken(public) as module:
+        for key, info in checks.infos(module).items():
+            inputs = SAMPLES[key](60, 41)
+            expected = compiled[key].function(*inputs)
+            assert info.function(*inputs).tobytes() == expected.tobytes(), key
