@@ -9,6 +9,7 @@ Nothing is guessed: a format, a projection or an empty value that is not given i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -80,22 +81,8 @@ def linear_depth(
     """
     d = numbers(device, "device")
     arguments = _arguments(format, projection, near, far, constant, ray_length)
-    shape = common_shape(device=d.shape, **{k: v.shape for k, v in arguments.items()})
-    out = np.empty(shape)
-    hole = 0.0 if empty is None else _like(empty, device)
-    _decode_all(
-        _CODE[format],
-        projection == "orthographic",
-        flat(d, shape),
-        flat(arguments["near"], shape),
-        flat(arguments["far"], shape),
-        flat(arguments["constant"], shape),
-        flat(arguments["ray_length"], shape),
-        empty is not None,
-        hole,
-        out.reshape(-1),
-    )
-    return out
+    hole = None if empty is None else _like(empty, device)
+    return _convert(_decode_all, "device", d, format, projection, arguments, hole)
 
 
 def device_depth(
@@ -118,21 +105,8 @@ def device_depth(
     """
     z = numbers(linear, "linear")
     arguments = _arguments(format, projection, near, far, constant, ray_length)
-    shape = common_shape(linear=z.shape, **{k: v.shape for k, v in arguments.items()})
-    out = np.empty(shape)
-    _encode_all(
-        _CODE[format],
-        projection == "orthographic",
-        flat(z, shape),
-        flat(arguments["near"], shape),
-        flat(arguments["far"], shape),
-        flat(arguments["constant"], shape),
-        flat(arguments["ray_length"], shape),
-        empty is not None,
-        0.0 if empty is None else float(empty),
-        out.reshape(-1),
-    )
-    return out
+    hole = None if empty is None else float(empty)
+    return _convert(_encode_all, "linear", z, format, projection, arguments, hole)
 
 
 def depth_codes(device: npt.ArrayLike, storage_type: Storage) -> AnyArray:
@@ -178,6 +152,30 @@ def ray_lengths(
     y = (view.cy - (np.arange(height) + 0.5)) / view.fy
     length: F64Array = np.sqrt((x * x)[None, :] + (y * y)[:, None] + 1.0)
     return length
+
+
+def _convert(
+    convert: Callable[..., None],
+    name: str,
+    values: F64Array,
+    format: str,
+    projection: str,
+    arguments: dict[str, F64Array],
+    empty: float | None,
+) -> F64Array:
+    """`convert` over values and arguments broadcast together; empty: as its driver takes it."""
+    shape = common_shape(**{name: values.shape}, **{k: v.shape for k, v in arguments.items()})
+    out = np.empty(shape)
+    convert(
+        _CODE[format],
+        projection == "orthographic",
+        flat(values, shape),
+        *(flat(arguments[key], shape) for key in ("near", "far", "constant", "ray_length")),
+        empty is not None,
+        0.0 if empty is None else empty,
+        out.reshape(-1),
+    )
+    return out
 
 
 def _like(value: float, device: npt.ArrayLike) -> float:
