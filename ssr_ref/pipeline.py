@@ -5,12 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .analytic.arrays import MaterialArrays, material_arrays
-from .analytic.gbuffer import OUTPUTS, analytic_gbuffer
-from .analytic.scene import AnalyticScene
 from .buffers import GBuffer, HitBuffer, Resolved
 from .camera import Camera, View, ViewParams
 from .raster.geometry import Geometry, flatten
@@ -22,6 +20,10 @@ from .settings import NEAR_PER_RADIUS, Settings
 from .shading.diffuse import light_arrays, shade_radiance
 from .ssr.resolve import resolve
 from .ssr.trace import trace
+
+if TYPE_CHECKING:  # imported where such a scene is rendered: few are
+    from .analytic.arrays import MaterialArrays
+    from .analytic.scene import AnalyticScene
 
 Progress = Callable[[str, float], None]
 """Called with a stage's name and the share of it that is done, 0 to 1."""
@@ -71,6 +73,8 @@ def render(
             materials = geometry = flatten(scene)
             store = texture_store(scene)
         else:
+            from .analytic.arrays import material_arrays
+
             materials = material_arrays(scene.materials)
     if isinstance(scene, Scene):
         with stages("raster"):
@@ -125,6 +129,8 @@ def raster_options(settings: Settings) -> RasterOptions:
 
 def cast_gbuffer(scene: AnalyticScene, camera: Camera, settings: Settings) -> GBuffer:
     """The closed-form G-buffer that these settings ask for."""
+    from .analytic.gbuffer import OUTPUTS, analytic_gbuffer
+
     options = raster_options(settings)
     return analytic_gbuffer(
         scene,

@@ -20,8 +20,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analytic.scene import AnalyticScene
-from ..analytic.scene_json import scene_from_json, scene_to_json
 from ..camera import Camera
 from ..errors import BundleError, FileError, SsrRefError
 from ..scene import Lights, Scene
@@ -34,6 +32,7 @@ from .folder import MANIFEST_FILE, FolderKind, disk_errors, whole_folder
 from .npz import content_sha256, file_sha256, read_npz, write_npz
 
 if TYPE_CHECKING:
+    from ..analytic.scene import AnalyticScene
     from ..pipeline import Frame, Progress
 
 SCENE_FILE, SHAPES_FILE, PREVIEWS = "scene.glb", "scene.json", "previews"
@@ -121,6 +120,8 @@ def _scene_stage(
     """Meshes go into scene.glb, closed-form shapes into scene.json."""
     if isinstance(scene, Scene):
         return SCENE_FILE, _write_scene, scene
+    from ..analytic.scene_json import scene_to_json
+
     return SHAPES_FILE, _write_json, scene_to_json(scene)
 
 
@@ -186,6 +187,8 @@ class Bundle:
         scene_file = _scene_file(self.manifest["files"])
         scene: Scene | AnalyticScene
         if scene_file == SHAPES_FILE:
+            from ..analytic.scene_json import scene_from_json
+
             scene = replace(scene_from_json(_read_json(self.path / scene_file)), lights=self.lights)
         else:
             from .load import load
