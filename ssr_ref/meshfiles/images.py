@@ -54,7 +54,7 @@ def read_image(name: str, data: bytes, *, room: int | None = None) -> Image:
     elif data.startswith(b"\xff\xd8\xff"):
         pixels = _through_pillow(name, data, "JPEG", room)
     elif data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-        _check_webp(name, data)
+        _check_webp(name, data, room)
         pixels = _through_pillow(name, data, "WEBP", room)
     else:
         raise image_error(
@@ -70,8 +70,13 @@ def image_error(name: str, found: str, expected: str) -> FileError:
     return FileError(" ".join(f"image '{name}' {found}; expected {expected}".split()))
 
 
-def _check_size(name: str, data: bytes, width: int, height: int, texel: int) -> None:
-    """Refuse, by its header, an image that is too large, or far larger than its file."""
+def _check_size(
+    name: str, data: bytes, width: int, height: int, texel: int, room: int | None
+) -> None:
+    """Refuse, by its header, an image that is too large, far larger than its file, or than `room`.
+
+    texel : bytes of one that is decoded.
+    """
     try:
         check_image_size(name, width, height)
     except SceneError as error:
@@ -83,9 +88,6 @@ def _check_size(name: str, data: bytes, width: int, height: int, texel: int) -> 
             f"decodes to {width * height * texel} bytes from {len(data)}",
             f"at most {most}: it may be an image bomb, scale it down",
         )
-
-
-def _check_room(name: str, width: int, height: int, texel: int, room: int | None) -> None:
     if room is not None and width * height * texel > room:
         raise NoRoomError(
             f"image '{name}' takes {width * height * texel} bytes; expected at most {max(room, 0)} "
@@ -98,8 +100,7 @@ def _read_png(name: str, data: bytes, room: int | None) -> AnyArray:
     if len(data) < 33 or data[12:16] != b"IHDR":
         raise image_error(name, "has no PNG header", "a valid PNG file: export it again")
     width, height, depth, color = struct.unpack(">IIBB", data[16:26])
-    _check_size(name, data, width, height, 8 if depth == 16 else 4)
-    _check_room(name, width, height, 8 if depth == 16 else 4, room)
+    _check_size(name, data, width, height, 8 if depth == 16 else 4, room)
     if width * height * depth > 8 * _MOST_INFLATED * len(data):
         raise image_error(
             name,
@@ -176,8 +177,7 @@ def _through_pillow(name: str, data: bytes, kind: str, room: int | None) -> AnyA
                 with PillowImage.open(io.BytesIO(data), formats=(kind,)) as file:
                     file.verify()  # the chunks' checksums, which decoding alone passes over
             with PillowImage.open(io.BytesIO(data), formats=(kind,)) as file:
-                _check_size(name, data, *file.size, 4)
-                _check_room(name, *file.size, 4, room)
+                _check_size(name, data, *file.size, 4, room)
                 # The second picture of a stereo JPEG is no animation: the first is the image.
                 if kind != "JPEG" and getattr(file, "is_animated", False):
                     raise image_error(name, "is animated", "a still image: export one frame")
@@ -198,7 +198,7 @@ def _through_pillow(name: str, data: bytes, kind: str, room: int | None) -> AnyA
         ) from None
 
 
-def _check_webp(name: str, data: bytes) -> None:
+def _check_webp(name: str, data: bytes, room: int | None) -> None:
     """Check the size in a WebP header: Pillow's reader takes memory for it when it opens.
 
     Source: RFC 9649, sections 2.5 to 2.7.
@@ -212,7 +212,7 @@ def _check_webp(name: str, data: bytes) -> None:
         width, height = (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1
     else:
         width, height = (v & 0x3FFF for v in struct.unpack("<HH", head[14:18]))
-    _check_size(name, data, width, height, 4)
+    _check_size(name, data, width, height, 4, room)
 
 
 def png_bytes(image: Image) -> bytes:
