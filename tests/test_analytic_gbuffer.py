@@ -266,8 +266,11 @@ def test_equal_depths_go_to_the_lower_shape() -> None:
 
 
 def test_the_back_of_any_object() -> None:
-    """A ball from 2 to 4 behind a board at 1: its back counts only if asked for."""
-    scene = scene_of(Disc((0, 0, -1), (0, 0, 1), 0.5), Sphere((0, 0, -3), 1.0))
+    """A ball from 2 to 4 behind a board at 1: its back counts only if asked for, and that of a ball
+    about the eye never: it is before the board.
+    """
+    about = Sphere((0, 0, 0), 0.75)
+    scene = scene_of(Disc((0, 0, -1), (0, 0, 1), 0.5), Sphere((0, 0, -3), 1.0), about)
     camera = front(SIZE)
     own = analytic_gbuffer(scene, camera, SIZE).back_depth
     any_of = analytic_gbuffer(scene, camera, SIZE, back_any_object=True).back_depth
