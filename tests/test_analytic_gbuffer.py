@@ -279,8 +279,9 @@ def test_the_back_of_any_object() -> None:
 
 
 @pytest.mark.parametrize("orthographic", [False, True])
-@pytest.mark.parametrize("power", [-40, 23])
+@pytest.mark.parametrize("power", [-600, -40, 23, 600])
 def test_a_change_of_unit_by_a_power_of_two_keeps_every_bit(power: int, orthographic: bool) -> None:
+    """Also where squared lengths would under- or overflow."""
     k = 2.0**power
     scene = clutter(orthographic=orthographic)
     images = []

@@ -152,7 +152,8 @@ def test_contact_gaps_by_hand() -> None:
 
     0: found at once, a later miss is no gap. 1: two missed before the first found. 2: never found.
     3: no object. 4: object, but its reflection is not on screen. 5: 2.5 px off, a gap at stride 1,
-    none at stride 2. A floor pixel above the object is never part of it.
+    none at stride 2. 6: the first pixel below is of a third object. A floor pixel above the object
+    is never part of it.
     """
     good, lost, off = (SEEN, 1, 0.5, 0.5), (SEEN, 1, 0.5, None), (SEEN, 1, 0.5, 3.0)
     other, body = (SEEN, 2, 0.5, 0.5), (NO, -1, None, None)
@@ -163,17 +164,19 @@ def test_contact_gaps_by_hand() -> None:
         [lost, lost, lost, lost, lost],
         [lost, body, other, other, other],
         [lost, body, off, good, good],
+        [lost, body, lost, good, good],
     ]
     hits, truth = made_up([list(row) for row in zip(*columns, strict=True)])
-    ids = np.zeros((5, 6), np.int32)
-    ids[1, [0, 1, 2, 4, 5]] = 1
-    gbuffer = GBuffer(depth=np.ones((5, 6)), triangle_id=ids, object_id=ids)
+    ids = np.zeros((5, 7), np.int32)
+    ids[1, [0, 1, 2, 4, 5, 6]] = 1
+    ids[2, 6] = 2
+    gbuffer = GBuffer(depth=np.ones((5, 7)), triangle_id=ids, object_id=ids)
 
     def gaps(stride: int) -> list[int]:
         return contact_gaps(hits, truth, gbuffer, floor=0, shape=1, stride=stride).tolist()
 
-    assert gaps(1) == [0, 2, 3, -1, -1, 1]
-    assert gaps(2) == [0, 2, 3, -1, -1, 0]
+    assert gaps(1) == [0, 2, 3, -1, -1, 1, 0]
+    assert gaps(2) == [0, 2, 3, -1, -1, 0, 0]
 
 
 BODIES: dict[str, Sphere | Plane | Disc | Box] = {
