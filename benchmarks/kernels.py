@@ -204,13 +204,20 @@ def _without_infinity(value: Any) -> Any:
 
 
 def draw(path: Path, rows: Sequence[Row], sphere: Sequence[SphereRow]) -> None:
-    """Error against time: all formulas with a bound; and wrong answers of each sphere form."""
+    """Error against time: all formulas with a bound; and wrong answers of each sphere form.
+
+    Points are numbered and named at the side: names beside them would cover each other.
+    """
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, 2 if sphere else 1, figsize=(14, 6), squeeze=False)
+    widths = [3.0, 2.2] + ([3.0, 1.1] if sphere else [])
+    figure, axes = plt.subplots(
+        1, len(widths), figsize=(2.1 * sum(widths), 9), width_ratios=widths, squeeze=False
+    )
     left = axes[0, 0]
     floor = 0.05
     bounded = sorted((r for r in rows if np.isfinite(r.bound)), key=lambda r: r.ns)
+    names = []
     for i, r in enumerate(bounded):
         error, bound = max(r.error, floor), max(r.bound, floor)
         marker = "o" if r.precision == "float64" else "s"
@@ -218,44 +225,57 @@ def draw(path: Path, rows: Sequence[Row], sphere: Sequence[SphereRow]) -> None:
         left.plot(r.ns, bound, "_", color="tab:red", ms=9)
         left.plot(r.ns, error, marker, color="tab:blue", ms=5)
         left.annotate(
-            r.key, (r.ns, error), xytext=(3, -8 - 9 * (i % 4)), textcoords="offset points",
-            fontsize=6,
+            str(i + 1), (r.ns, error), xytext=(0, -9 - 7 * (i % 5)), textcoords="offset points",
+            fontsize=6, ha="center",
         )  # fmt: skip
+        names.append(f"{i + 1}  {r.key} {r.precision[-2:]}, {r.ns:.0f} ns")
     left.set(
-        xscale="log", yscale="log", xlabel="ns a case (over arrays)",
-        ylabel="worst error in u · (1 + condition number); exact drawn at the lower edge",
-        title="measured (dot: float64, square: float32) and stated bound (red)",
+        xscale="log", yscale="log", xlabel="ns a case (over arrays)", ylim=(floor / 3.0, None),
+        ylabel=f"worst error in u · (1 + condition number); exact drawn at {floor}",
+        title="measured (dot: float64, square: float32), stated bound (red)",
     )  # fmt: skip
+    write_names(axes[0, 1], names)
     if sphere:
-        draw_spheres(axes[0, 1], [r for r in sphere if r.region.startswith("distance")])
+        chosen = [r for r in sphere if r.region.startswith("distance")]
+        write_names(axes[0, 3], draw_spheres(axes[0, 2], chosen))
     figure.tight_layout()
     figure.savefig(path, dpi=130)
 
 
-def draw_spheres(axis: Any, rows: Sequence[SphereRow]) -> None:
-    """Each form and precision a column at its time, a point a distance."""
+def write_names(axis: Any, names: Sequence[str]) -> None:
+    """A list of names in the place of a plot."""
+    axis.axis("off")
+    axis.text(0.0, 1.0, "\n".join(names), va="top", fontsize=7, transform=axis.transAxes)
+
+
+def draw_spheres(axis: Any, rows: Sequence[SphereRow]) -> list[str]:
+    """Each form and precision a column at its time, a point a distance; the columns' names."""
     import matplotlib.pyplot as plt
 
     names = list(dict.fromkeys(r.region for r in rows))
     shades = plt.get_cmap("viridis")(np.linspace(0.0, 0.95, len(names)))
-    for i, (precision, marker) in enumerate((("float64", "o"), ("float32", "s"))):
-        for k, form in enumerate(FORMS):
+    columns = []
+    for precision, marker in (("float64", "o"), ("float32", "s")):
+        for form in FORMS:
             mine = [r for r in rows if r.form == form and r.precision == precision]
             ns = float(np.median([r.ns for r in mine]))
             for r in mine:
                 color = shades[names.index(r.region)]
-                label = r.region if form == FORMS[0] and precision == "float64" else None
+                label = None if columns else r.region
                 axis.plot(ns, max(r.wrong, 1e-3), marker, color=color, ms=5, label=label)
+            letter = chr(ord("a") + len(columns))
             axis.annotate(
-                f"{form} {precision[-2:]}", (ns, 1e-3), fontsize=6, rotation=60,
-                xytext=(0, -34 - 4 * (k % 2)), textcoords="offset points", color=f"C{i}",
+                letter, (ns, 1e-3), fontsize=8, ha="center", textcoords="offset points",
+                xytext=(0, -14 - 9 * (len(columns) % 4)),
             )  # fmt: skip
+            columns.append(f"{letter}  {form} {precision[-2:]}, {ns:.0f} ns")
     axis.set(
         xscale="log", yscale="log", ylim=(2e-4, 1.0), xlabel="ns a ray (column of each form)",
         ylabel="share of wrong hits and misses (none drawn at 0.001)",
         title="line against sphere (dot: float64, square: float32)",
     )  # fmt: skip
     axis.legend(fontsize=6, loc="center right")
+    return columns
 
 
 def main() -> None:

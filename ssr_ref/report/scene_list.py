@@ -172,7 +172,8 @@ img { display: block; width: 100%; height: auto; background: #000; }
 .text { display: flex; flex-direction: column; flex: 1; padding: 0.9rem 1rem 1rem; }
 .size, header p { color: var(--soft); }
 .size { font-size: 0.9rem; margin-bottom: 0.75rem; }
-pre { margin: auto 0 0; padding: 0.5rem 0.7rem; overflow-x: auto; background: var(--code);
+pre { margin: auto 0 0; padding: 0.5rem 0.7rem; overflow-x: auto; white-space: pre-wrap;
+ overflow-wrap: anywhere; background: var(--code);
  border-radius: 0.35rem; font-size: 0.85rem; }
 code { font-family: ui-monospace, SFMono-Regular, Menlo, Consolas, monospace; }
 </style>
