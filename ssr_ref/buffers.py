@@ -158,6 +158,60 @@ class Resolved:
         return _arrays(self)
 
 
-def _arrays(buffers: GBuffer | HitBuffer | Resolved) -> dict[str, AnyArray]:
+class TruthClass(IntEnum):
+    """What becomes of a pixel's reflected ray in truth, and whether the camera sees what it meets.
+
+    The first that applies, in the order NOTHING, OFF_SCREEN, BACK_FACING, OCCLUDED, VISIBLE.
+    """
+
+    NO_RAY = 0
+    NOTHING = 1
+    OFF_SCREEN = 2
+    BACK_FACING = 3
+    OCCLUDED = 4
+    VISIBLE = 5
+
+
+class Side(IntEnum):
+    """Where an OFF_SCREEN point lies; the first that applies."""
+
+    NONE = 0
+    BEHIND = 1  # before the near plane or behind the eye
+    BEYOND = 2  # deeper than the far plane
+    LEFT = 3
+    RIGHT = 4
+    TOP = 5
+    BOTTOM = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """The first hit X of every reflective pixel's ray, by tracing the scene itself.
+
+    truth (H, W) uint8: `TruthClass`. side (H, W) uint8: `Side`, of OFF_SCREEN alone.
+    triangle_id, object_id (H, W) int32: what X lies on, numbered as in the G-buffer; −1 where there
+    is none.
+    distance (H, W) float64: along the ray, scene units. hit_px (H, W, 2) float64: sub-pixel
+    position of X, also outside the image; NaN at and behind the eye. hit_depth (H, W) float64: its
+    view depth, of either sign. All NaN where there is no X.
+    radiance (H, W, 3) float64: diffuse radiance of X on the side that was met, linear RGB; NaN
+    where there is no X.
+    """
+
+    truth: U8Array
+    side: U8Array
+    triangle_id: I32Array
+    object_id: I32Array
+    distance: F64Array
+    hit_px: F64Array
+    hit_depth: F64Array
+    radiance: F64Array
+
+    def arrays(self) -> dict[str, AnyArray]:
+        """The buffers by name."""
+        return _arrays(self)
+
+
+def _arrays(buffers: GBuffer | HitBuffer | Resolved | Truth) -> dict[str, AnyArray]:
     named = {f.name: getattr(buffers, f.name) for f in fields(buffers) if f.name != "counts"}
     return {name: array for name, array in named.items() if array is not None}

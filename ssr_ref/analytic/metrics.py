@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..buffers import GBuffer, HitBuffer, Status
+from ..buffers import GBuffer, HitBuffer, Status, TruthClass
 from ..typed import BoolArray, F64Array, I64Array
-from .reflections import AnalyticReflections, TruthClass
+from .reflections import AnalyticReflections
 
 FAR_PX = 2.0
 """A hit further than this from the closed form's position is on something else."""

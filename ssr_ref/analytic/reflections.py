@@ -21,12 +21,11 @@ distance between two surfaces that matters.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import IntEnum
 
 import numpy as np
 
 from .._jit import driver, kernel
-from ..buffers import GBuffer
+from ..buffers import GBuffer, TruthClass
 from ..camera import Camera, ViewParams, clip_xyw, to_view
 from ..errors import SettingsError
 from ..raster.surface import load
@@ -41,17 +40,6 @@ from .scene import AnalyticScene
 
 SAME_DEPTH = 2.0**-20
 """Relative difference of depths below which two points on one eye ray are the same."""
-
-
-class TruthClass(IntEnum):
-    """What becomes of a pixel's reflected ray, and whether the camera sees what it meets."""
-
-    NO_RAY = 0
-    NOTHING = 1
-    OFF_SCREEN = 2
-    BACK_FACING = 3
-    OCCLUDED = 4
-    VISIBLE = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
