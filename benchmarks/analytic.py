@@ -25,7 +25,7 @@ from ssr_ref.analytic import (
     hit_errors,
 )
 from ssr_ref.analytic.scenes import SCENES
-from ssr_ref.cli.render import parse_size
+from ssr_ref.cli.parsing import parse_size
 from ssr_ref.pipeline import make_camera
 from ssr_ref.ssr.trace import trace
 

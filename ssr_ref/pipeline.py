@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from .buffers import GBuffer, HitBuffer, Resolved
 from .camera import Camera, View, ViewParams
+from .errors import SettingsError
 from .raster.geometry import Geometry, flatten
 from .raster.rasterize import RasterOptions, rasterize, visible_textures
 from .raster.textures import TextureStore, texture_store
@@ -30,10 +31,20 @@ Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Traced:
+    """What one method made of a G-buffer. settings are resolved: no length is None."""
+
+    settings: Settings
+    hits: HitBuffer
+    resolved: Resolved
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """One rendered image with everything that explains it.
 
     settings are resolved: no length is None. warnings: one line each. timings: seconds a stage.
+    more: further methods on the same G-buffer, by name.
     """
 
     scene: Scene | AnalyticScene
@@ -44,6 +55,14 @@ class Frame:
     resolved: Resolved
     warnings: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
+    more: Mapping[str, Traced] = field(default_factory=dict)
+
+    def of(self, name: str) -> Frame:
+        """The frame of one of `more`, as if it had been rendered alone."""
+        traced = self.more[name]
+        return replace(
+            self, settings=traced.settings, hits=traced.hits, resolved=traced.resolved, more={}
+        )
 
 
 def render(
@@ -51,21 +70,27 @@ def render(
     camera: Camera | View | None = None,
     settings: Settings | None = None,
     *,
+    more: Mapping[str, Settings] | None = None,
     progress: Progress | None = None,
 ) -> Frame:
     """Rasterize a scene, trace its reflections, composite.
 
     A closed-form scene is not rasterized: its rays are cast (`analytic.analytic_gbuffer`).
     camera: a `Camera`, or a `View` that becomes one; None: the scene's own view, or one framed on
-    its bounds. settings: None: the defaults. progress: called with stage and share done.
+    its bounds. settings: None: the defaults. more: further methods by name, which need the same
+    G-buffer (`check_same_gbuffer`). progress: called with stage and share done.
     Raises SceneError, CameraError or SettingsError.
     """
     stages = _Stages(progress)
     settings = settings or Settings()
+    others = dict(more or {})
+    for name, other in others.items():
+        check_same_gbuffer(settings, other, name)
 
     with stages("geometry"):
         radius = scene.radius()
         settings = settings.resolved(radius)
+        others = {name: other.resolved(radius) for name, other in others.items()}
         camera = make_camera(scene, camera, settings, radius)
         view = camera.params(settings.size)
         materials: Geometry | MaterialArrays
@@ -78,27 +103,58 @@ def render(
             materials = material_arrays(scene.materials)
     if isinstance(scene, Scene):
         with stages("raster"):
-            gbuffer, positions_vs = rasterize(view, geometry, raster_options(settings), store=store)
+            options = raster_options(settings, *others.values())
+            gbuffer, positions_vs = rasterize(view, geometry, options, store=store)
         with stages("radiance"):
             gbuffer = with_radiance(view, geometry, positions_vs, gbuffer, scene, store)
     else:
         with stages("raster"):
-            gbuffer = cast_gbuffer(scene, camera, settings)
+            gbuffer = cast_gbuffer(scene, camera, settings, *others.values())
     gbuffer = with_thickness(gbuffer, scene, settings)
-    with stages("trace"):
-        hits = trace(view, gbuffer, settings, stages.within("trace"))
-    with stages("resolve"):
-        resolved = resolve(view, gbuffer, hits, settings)
+    traced = trace_method(view, gbuffer, settings, stages, "")
     return Frame(
         scene=scene,
         camera=camera,
         settings=settings,
         gbuffer=gbuffer,
-        hits=hits,
-        resolved=resolved,
+        hits=traced.hits,
+        resolved=traced.resolved,
         warnings=(*scene.notes, *frame_warnings(scene, materials, gbuffer, settings)),
         timings=stages.seconds,
+        more={
+            name: trace_method(view, gbuffer, other, stages, " " + name)
+            for name, other in others.items()
+        },
     )
+
+
+def trace_method(
+    view: ViewParams, gbuffer: GBuffer, settings: Settings, stages: _Stages, suffix: str
+) -> Traced:
+    """Trace and resolve; the stages' names get the suffix."""
+    with stages("trace" + suffix):
+        hits = trace(view, gbuffer, settings, stages.within("trace" + suffix))
+    with stages("resolve" + suffix):
+        resolved = resolve(view, gbuffer, hits, settings)
+    return Traced(settings, hits, resolved)
+
+
+GBUFFER_SETTINGS = ("size", "back_any_object", "fresnel", "max_roughness", "snap", "buffer_dtype")
+"""Settings that decide what a G-buffer holds, and not only whether it holds it."""
+
+
+def check_same_gbuffer(settings: Settings, other: Settings, name: str) -> None:
+    """Raise SettingsError if a further method would need a G-buffer of its own."""
+    keys: tuple[str, ...] = GBUFFER_SETTINGS
+    if "material" in (settings.thickness_from, other.thickness_from):
+        keys = (*keys, "thickness_from", "thickness")
+    for key in keys:
+        first, second = getattr(settings, key), getattr(other, key)
+        if first != second:
+            raise SettingsError(
+                f"method '{name}' has {key} {second}, the first method {first}; expected the same "
+                "G-buffer for all: render it apart"
+            )
 
 
 def make_camera(
@@ -115,10 +171,10 @@ def make_camera(
     return view.camera(settings.size, NEAR_PER_RADIUS * radius)
 
 
-def raster_options(settings: Settings) -> RasterOptions:
-    """What the rasterizer must produce for these settings."""
+def raster_options(settings: Settings, *others: Settings) -> RasterOptions:
+    """What the rasterizer must produce for these settings, and for further methods'."""
     return RasterOptions(
-        back_depth=settings.thickness_from == "back_faces",
+        back_depth=any(s.thickness_from == "back_faces" for s in (settings, *others)),
         back_any_object=settings.back_any_object,
         fresnel=settings.fresnel,
         max_roughness=settings.max_roughness,
@@ -127,11 +183,13 @@ def raster_options(settings: Settings) -> RasterOptions:
     )
 
 
-def cast_gbuffer(scene: AnalyticScene, camera: Camera, settings: Settings) -> GBuffer:
-    """The closed-form G-buffer that these settings ask for."""
+def cast_gbuffer(
+    scene: AnalyticScene, camera: Camera, settings: Settings, *others: Settings
+) -> GBuffer:
+    """The closed-form G-buffer that these settings ask for, and further methods'."""
     from .analytic.gbuffer import OUTPUTS, analytic_gbuffer
 
-    options = raster_options(settings)
+    options = raster_options(settings, *others)
     return analytic_gbuffer(
         scene,
         camera,

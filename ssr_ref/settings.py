@@ -188,6 +188,25 @@ class Settings:
             raise SettingsError(f"settings cannot be read: {error}") from None
 
 
+METHODS: dict[str, dict[str, Any]] = {
+    "march": {"tracer": "march", "surface": "constant"},
+    "dda": {"tracer": "dda"},
+    "exact": {"tracer": "cells", "surface": "constant"},
+    "planes": {"tracer": "cells", "surface": "plane"},
+}
+"""What a method's name stands for. `surface` "plane" gives "dda" its one-fetch form."""
+
+
+def method_settings(name: str, base: Settings, **changes: Any) -> Settings:
+    """The base with changes, as the method of this name.
+
+    Raises SettingsError for an unknown name, and for what the method has not.
+    """
+    if name not in METHODS:
+        raise SettingsError(f"method is '{name}'; expected one of {', '.join(METHODS)}")
+    return replace(base, **{**changes, **METHODS[name]})
+
+
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "tracer": get_args(TracerName),
     "surface": get_args(SurfaceName),

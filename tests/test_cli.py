@@ -12,6 +12,7 @@ import sys
 import textwrap
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ import ssr_ref
 from ssr_ref.__main__ import main, split_global_options
 from ssr_ref.camera import Camera, View
 from ssr_ref.cli import progress as progress_module
+from ssr_ref.cli.options import SETTING_OPTIONS
 from ssr_ref.cli.output import Output
 from ssr_ref.fileio import bundle as bundle_module
 from ssr_ref.fileio.bundle import load_bundle, write_bundle
@@ -30,8 +32,9 @@ TESTS = Path(__file__).parent
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
-def made_up_render(scene, camera=None, settings=None, *, progress=None):
+def made_up_render(scene, camera=None, settings=None, *, more=None, progress=None):
     """Stands for the pipeline: the camera and settings that it would use, made-up buffers."""
+    from ssr_ref.pipeline import Traced
     from ssr_ref.scenes import framed_view
 
     settings = (settings or Settings()).resolved(scene.radius())
@@ -41,8 +44,16 @@ def made_up_render(scene, camera=None, settings=None, *, progress=None):
     if progress is not None:
         progress("trace", 0.5)
     frame = made_up_frame((1, 1) if settings.size == (960, 540) else settings.size)
+    size = frame.settings.size
     return replace(
-        frame, scene=scene, camera=camera, settings=replace(settings, size=frame.settings.size)
+        frame,
+        scene=scene,
+        camera=camera,
+        settings=replace(settings, size=size),
+        more={
+            name: Traced(replace(other.resolved(1.0), size=size), frame.hits, frame.resolved)
+            for name, other in (more or {}).items()
+        },
     )
 
 
@@ -51,9 +62,9 @@ def rendered(monkeypatch):
     """Settings and cameras of the renders that were asked for."""
     asked = []
 
-    def render(scene, camera=None, settings=None, *, progress=None):
-        asked.append((scene, camera, settings))
-        return made_up_render(scene, camera, settings, progress=progress)
+    def render(scene, camera=None, settings=None, *, more=None, progress=None):
+        asked.append((scene, camera, settings, *(more or {}).items()))
+        return made_up_render(scene, camera, settings, more=more, progress=progress)
 
     monkeypatch.setattr("ssr_ref.pipeline.render", render, raising=False)
     return asked
@@ -106,12 +117,18 @@ def test_version(capsys, line):
     assert capsys.readouterr() == (f"ssr-ref {ssr_ref.__version__}\n", "")
 
 
-def test_every_setting_has_an_option(capsys):
-    run_line("render --help")
-    out = without_colors(capsys.readouterr().out)
-    names = set(Settings.__dataclass_fields__) - {"fallback"}  # --fallback-color switches it on
-    missing = [n for n in names if "--" + n.replace("_", "-") not in out]
-    assert missing == []
+def test_every_setting_has_an_option_of_its_type():
+    names = [name for _, name, _, _ in SETTING_OPTIONS]
+    shown = {*names, "size", "fallback", "fallback_color"}  # these three are spelt out
+    assert shown == set(Settings.__dataclass_fields__) and len(names) == len(set(names))
+    hints = get_type_hints(Settings)
+    for _, name, metavar, _ in SETTING_OPTIONS:
+        parts = [part for part in get_args(hints[name]) if part is not type(None)]
+        if get_origin(hints[name]) is Literal:
+            assert metavar == "|".join(parts), name
+        else:
+            kind = parts[0] if parts else hints[name]
+            assert metavar == {int: "N", float: "X", bool: None}[kind], name
 
 
 def subprocess_of(code: str, *arguments: str, **options):

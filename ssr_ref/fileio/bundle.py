@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 SCENE_FILE, SHAPES_FILE, PREVIEWS = "scene.glb", "scene.json", "previews"
 CAMERA_FILE, LIGHTS_FILE, SETTINGS_FILE = "camera.json", "lights.json", "settings.json"
+METHODS_FILE = "methods.json"
 NPZ_FILE, EXR_FILE = "golden.npz", "golden.exr"
 RUN_FILE = "run.json"
 _KIND = FolderKind("golden bundle", "bundle", contents.FORMAT, (MANIFEST_FILE, RUN_FILE))
@@ -80,6 +81,7 @@ def _write_files(frame: Frame, folder: Path, *, previews: bool, progress: Progre
         (CAMERA_FILE, _write_json, frame.camera.to_json()),
         (LIGHTS_FILE, _write_json, frame.scene.lights.to_json()),
         (SETTINGS_FILE, _write_json, frame.settings.to_json()),
+        *_methods_stage(frame),
         _scene_stage(frame.scene),
         (NPZ_FILE, write_npz, arrays),
         (EXR_FILE, _write_exr, arrays),
@@ -114,6 +116,14 @@ def _write_exr(path: Path, arrays: dict[str, Any]) -> None:
     write_exr(path, contents.exr_channels(arrays))  # the planes live no longer than this
 
 
+def _methods_stage(frame: Frame) -> list[tuple[str, Callable[[Path, Any], object], Any]]:
+    """Settings of further methods, if there are any."""
+    if not frame.more:
+        return []
+    named = {name: traced.settings.to_json() for name, traced in frame.more.items()}
+    return [(METHODS_FILE, _write_json, named)]
+
+
 def _scene_stage(
     scene: Scene | AnalyticScene,
 ) -> tuple[str, Callable[[Path, Any], object], Any]:
@@ -137,6 +147,8 @@ def _write_previews(folder: Path, frame: Frame) -> None:
     try:
         folder.mkdir()
         write_previews(frame, folder)
+        for name in frame.more:
+            write_previews(frame.of(name), folder / name, shared=False)
     except FileError as error:
         if isinstance(error.__cause__, OSError):  # a full disk is told in the same words everywhere
             raise error.__cause__ from None
@@ -167,7 +179,8 @@ class Bundle:
     """A verified bundle.
 
     manifest : the contents of manifest.json. arrays : name to array, as golden.npz holds them
-    (docs/bundle.md has shapes and units). settings : resolved, no length is None.
+    (docs/bundle.md has shapes and units). settings : resolved, no length is None. more : settings
+    of further methods, whose arrays are named "METHOD.array".
     """
 
     path: Path
@@ -176,6 +189,7 @@ class Bundle:
     camera: Camera
     lights: Lights
     settings: Settings
+    more: dict[str, Settings]
 
     @cached_property
     def scene(self) -> Scene | AnalyticScene:
@@ -223,6 +237,7 @@ def load_bundle(path: str | Path) -> Bundle:
             camera=Camera.from_json(_read_json(folder / CAMERA_FILE)),
             lights=Lights.from_json(_read_json(folder / LIGHTS_FILE)),
             settings=Settings.from_json(_read_json(folder / SETTINGS_FILE)),
+            more=_further_settings(folder, manifest),
         )
     except BundleError:
         raise
@@ -235,6 +250,13 @@ def load_bundle(path: str | Path) -> Bundle:
             f"{folder}: {MANIFEST_FILE} lacks what a reader needs ({error!r}); write the bundle "
             "anew"
         ) from None
+
+
+def _further_settings(folder: Path, manifest: Mapping[str, Any]) -> dict[str, Settings]:
+    if METHODS_FILE not in manifest["files"]:
+        return {}
+    named = _read_json(folder / METHODS_FILE)
+    return {name: Settings.from_json(named[name]) for name in sorted(named)}
 
 
 def read_identity(path: str | Path) -> str:

@@ -74,26 +74,36 @@ def stored_arrays(frame: Frame) -> dict[str, AnyArray]:
     """Every array of a frame as golden.npz holds it, and hit_uv; sorted by name.
 
     Floats are rounded once to float32 (float64 if settings.buffer_dtype says so), and every NaN
-    becomes the same quiet NaN. Raises BundleError if two buffers share a name.
+    becomes the same quiet NaN. Arrays of further methods are named "METHOD.array". Raises
+    BundleError if two buffers share a name.
     """
     floats = np.float64 if frame.settings.buffer_dtype == "float64" else np.float32
+    found: dict[str, AnyArray] = {}
+    groups = [("", frame.gbuffer.arrays()), ("", _traced_arrays(frame, floats))]
+    groups += [(name + ".", _traced_arrays(frame.of(name), floats)) for name in frame.more]
+    for prefix, group in groups:
+        for name, array in group.items():
+            if prefix + name in found:
+                raise BundleError(
+                    f"two buffers are named {prefix + name}; expected names of their own"
+                )
+            found[prefix + name] = _stored(array, floats)
+    return dict(sorted(found.items()))
+
+
+def _traced_arrays(frame: Frame, floats: Any) -> dict[str, AnyArray]:
+    """Hits, hit_uv and colours of a frame, as stored."""
     width, height = frame.settings.size
     uv = frame.hits.hit_px / np.array([width, height], np.float64)
-    found: dict[str, AnyArray] = {}
-    for group in (
-        frame.gbuffer.arrays(),
-        frame.hits.arrays(),
-        frame.resolved.arrays(),
-        {"hit_uv": uv},
-    ):
-        for name, array in group.items():
-            if name in found:
-                raise BundleError(f"two buffers are named {name}; expected names of their own")
-            found[name] = _stored(array, floats)
+    found = {
+        name: _stored(array, floats)
+        for group in (frame.hits.arrays(), frame.resolved.arrays(), {"hit_uv": uv})
+        for name, array in group.items()
+    }
     if floats is np.float32:
         _keep_in_texel(found["hit_px"], frame.hits.hit_px, (1, 1))
         _keep_in_texel(found["hit_uv"], frame.hits.hit_px, (width, height))
-    return dict(sorted(found.items()))
+    return found
 
 
 def _keep_in_texel(stored: AnyArray, hit_px: AnyArray, scale: tuple[int, int]) -> None:
@@ -146,8 +156,12 @@ def exr_channels(arrays: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
 
 
 def channel_names(array_name: str) -> tuple[str, ...]:
-    """The EXR channels of an array, one for each component."""
-    return CHANNELS.get(array_name, (array_name,))
+    """The EXR channels of an array, one for each component.
+
+    A further method's are in a layer of its name.
+    """
+    layer, dot, own = array_name.rpartition(".")
+    return tuple(layer + dot + channel for channel in CHANNELS.get(own, (own,)))
 
 
 def build(frame: Frame, arrays: Mapping[str, AnyArray], files: Mapping[str, str]) -> dict[str, Any]:
@@ -174,6 +188,7 @@ def build(frame: Frame, arrays: Mapping[str, AnyArray], files: Mapping[str, str]
             "flags": {str(f.name): int(f) for f in Flag},
         },
         "statistics": statistics(frame),
+        **({} if not frame.more else {"methods": _methods(frame)}),
         "warnings": list(frame.warnings),
         "arrays": {
             name: {
@@ -216,18 +231,29 @@ def statistics(frame: Frame) -> dict[str, Any]:
     }
 
 
+def _methods(frame: Frame) -> dict[str, Any]:
+    """Numbers of every further method; what the rasterizer met is the same for all."""
+    return {
+        name: {k: v for k, v in statistics(frame.of(name)).items() if k != "raster"}
+        for name in frame.more
+    }
+
+
 def identity(manifest: Mapping[str, Any]) -> str:
     """The golden's identity: SHA-256 of one line of text for each thing that fixes it.
 
     The lines, each ended by a newline: "array NAME HASH" sorted by name, "scene HASH",
-    "camera.json HASH", "settings.json HASH"; the last two are hashes of the files.
+    "camera.json HASH", "settings.json HASH", and "methods.json HASH" if there is one; the last
+    three are hashes of the files.
     """
+    files = manifest["files"]
     lines = [
         f"array {name} {manifest['arrays'][name]['content_sha256']}"
         for name in sorted(manifest["arrays"])
     ]
     lines.append(f"scene {manifest['scene']['content_sha256']}")
-    lines += [f"{name} {manifest['files'][name]}" for name in ("camera.json", "settings.json")]
+    parts = ("camera.json", "settings.json", "methods.json")
+    lines += [f"{name} {files[name]}" for name in parts if name in files]
     return hashlib.sha256("".join(line + "\n" for line in lines).encode()).hexdigest()
 
 

@@ -72,19 +72,22 @@ class _Inputs:
         return out
 
 
-def write_previews(frame: Frame, folder: Path) -> list[str]:
+def write_previews(frame: Frame, folder: Path, *, shared: bool = True) -> list[str]:
     """Write a PNG for each buffer that exists, and `overview.png`; returns their sorted names.
 
+    shared : pictures of the G-buffer too, which all methods of a frame have in common.
     The folder is made if it is missing; files of the same names are replaced. Raises FileError
     where the folder cannot be written.
     """
+    common = frozenset(frame.gbuffer.arrays())
     folder = Path(folder)
     names: list[str] = []
     panels: dict[str, Panel] = {}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, picture in pictures(frame):
-            names.append(_save(with_legend(picture.rgb, picture.legend), folder, name))
+            if shared or not common.issuperset(_NEEDED[name]):
+                names.append(_save(with_legend(picture.rgb, picture.legend), folder, name))
             if name in OVERVIEW:
                 panels[name] = Panel(name, picture.rgb, picture.note, picture.blend)
         sheet = contact_sheet([panels[n] for n in OVERVIEW if n in panels], *_captions(frame))
@@ -545,11 +548,18 @@ def _captions(frame: Frame) -> tuple[Legend, Legend]:
     """The contact sheet's title and its footer, the key of the status panel."""
     s = frame.settings
     height, width = frame.gbuffer.depth.shape
+    how = [s.tracer, "planes" if s.surface == "plane" else f"bias {s.bias:g}"]
+    if s.tracer == "march":
+        how += [f"step {_setting(s.step)}, {s.growth} growth", f"refine {s.refinement}"]
+    elif s.tracer == "dda":
+        how += [f"stride {s.stride}", f"refine {s.refinement}"]
+        how += [f"interval {s.interval}"] if s.surface == "constant" else []
+    how += ["jitter"] if s.jitter and s.tracer != "cells" else []
+    how += ["as published"] if s.listing else []
     title = [
         f"{frame.scene.name}, {width} x {height} px",
-        f"{s.tracer}, stride {s.stride}{', jitter' if s.jitter else ''}, thickness from "
-        f"{s.thickness_from.replace('_', ' ')} (constant: {_setting(s.thickness)}), "
-        f"bias {s.bias:g}, max distance {_setting(s.max_distance)}, interval {s.interval}",
+        f"{', '.join(how)}, thickness from {s.thickness_from.replace('_', ' ')} (constant: "
+        f"{_setting(s.thickness)}), max distance {_setting(s.max_distance)}",
     ]
     if frame.warnings:
         more = len(frame.warnings) - 1
@@ -594,3 +604,4 @@ _PICTURES: tuple[tuple[str, tuple[str, ...], Callable[[_Inputs], Picture]], ...]
     ("distance_fade", ("distance_fade", "status"), _distance_fade),
 )
 """Every picture: its name, the buffers it needs, and what draws it."""
+_NEEDED = {name: needed for name, needed, _ in _PICTURES}

@@ -1,0 +1,305 @@
+"""Options that several commands share: which scene, which camera, how it is traced.
+
+A command takes a parameter of an options class; `grouped` puts the class's own options in its place
+on the command line. An option of `Settings` is one row of a table here.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import MISSING, dataclass, fields, replace
+from functools import wraps
+from pathlib import Path
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    cast,
+    get_type_hints,
+)
+
+import typer
+
+from ..errors import CameraError, SceneError, SettingsError
+from .parsing import parse_camera, parse_color, parse_scene, parse_size, read_json
+
+if TYPE_CHECKING:
+    from ..camera import Camera, View
+    from ..meshfiles.options import NormalsName, UpName
+    from ..scene import Scene
+    from ..settings import Settings
+
+_SCENE, _CAMERA = "Scene", "Camera"
+_TRACE, _RESOLVE = "Tracing", "Fades, colours and buffers"
+
+
+def _option(panel: str, text: str, metavar: str | None = None, *names: str) -> Any:
+    return typer.Option(*names, help=text, metavar=metavar, rich_help_panel=panel)
+
+
+class Options:
+    """Base of the options classes."""
+
+    @classmethod
+    def parameters(cls) -> list[inspect.Parameter]:
+        """The options as parameters of a command; here: the fields of a dataclass."""
+        hints = get_type_hints(cls, include_extras=True)
+        return [
+            inspect.Parameter(
+                field.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=inspect.Parameter.empty if field.default is MISSING else field.default,
+                annotation=hints[field.name],
+            )
+            for field in fields(cast(Any, cls))
+        ]
+
+
+def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The command with each parameter of an options class replaced by that class's options."""
+    hints = get_type_hints(command, include_extras=True)
+    parameters: list[inspect.Parameter] = []
+    groups: dict[str, tuple[type[Options], list[str]]] = {}
+    for parameter in inspect.signature(command).parameters.values():
+        kind = hints[parameter.name]
+        if isinstance(kind, type) and issubclass(kind, Options):
+            own = kind.parameters()
+            groups[parameter.name] = kind, [p.name for p in own]
+            parameters += own
+        else:
+            parameters.append(
+                parameter.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY)
+            )
+
+    @wraps(command)
+    def run(**given: Any) -> Any:
+        for name, (kind, names) in groups.items():
+            given[name] = kind(**{option: given.pop(option) for option in names})
+        return command(**given)
+
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneOptions(Options):
+    """How a scene is loaded and lit."""
+
+    mirror_floor: Annotated[
+        bool, _option(_SCENE, "Add a mirror under the scene.", None, "--mirror-floor")
+    ] = False
+    normals: Annotated[
+        str, _option(_SCENE, "Where shading normals come from.", "authored|flat|smooth|crease")
+    ] = "authored"
+    up: Annotated[str, _option(_SCENE, "Upward axis of a mesh file.", "y|z")] = "y"
+    unit: Annotated[
+        str | None, _option(_SCENE, "What one unit of a mesh file is.", "mm|cm|m|inch|foot")
+    ] = None
+    gltf_scene: Annotated[
+        str | None, _option(_SCENE, "Scene of a glTF file, by index or name.", "NAME", "--scene")
+    ] = None
+    strict: Annotated[
+        bool, _option(_SCENE, "Refuse a file that is not drawn as it stands.", None, "--strict")
+    ] = False
+    allow_outside: Annotated[
+        bool,
+        _option(
+            _SCENE, "Let a mesh file refer to files outside its folder.", None, "--allow-outside"
+        ),
+    ] = False
+    tessellation: Annotated[int | None, _option(_SCENE, "Fineness of a built-in scene.", "N")] = (
+        None
+    )
+    lights: Annotated[
+        Path | None, _option(_SCENE, "Lights, as a bundle's lights.json.", "FILE.json")
+    ] = None
+
+    def check(self) -> None:
+        """Raise what can be found wrong before the scene is read."""
+        self._lights()
+
+    def load(self, scene: str) -> Scene:
+        """The scene of a name or a file."""
+        from ..fileio.load import load
+
+        lights = self._lights()
+        loaded = load(
+            scene,
+            normals=cast("NormalsName", self.normals),  # checked where they are used
+            up=cast("UpName", self.up),
+            unit=self.unit,
+            strict=self.strict,
+            allow_outside=self.allow_outside,
+            scene=parse_scene(self.gltf_scene),
+            mirror_floor=self.mirror_floor,
+            tessellation=self.tessellation,
+        )
+        return loaded if lights is None else loaded.with_lights(lights)
+
+    def _lights(self) -> Any:
+        from ..scene import Lights
+
+        return None if self.lights is None else read_json(self.lights, Lights.from_json, SceneError)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraOptions(Options):
+    """Where a scene is seen from."""
+
+    camera: Annotated[
+        Path | None,
+        _option(
+            _CAMERA, "Matrices, as a bundle's camera.json, or a view: eye, target.", "FILE.json"
+        ),
+    ] = None
+    fov: Annotated[float | None, _option(_CAMERA, "Vertical field of view in degrees.", "DEG")] = (
+        None
+    )
+    orthographic: Annotated[
+        float | None, _option(_CAMERA, "Parallel projection of this height.", "HEIGHT")
+    ] = None
+    near: Annotated[float | None, _option(_CAMERA, "Near view depth.", "X")] = None
+    far: Annotated[float | None, _option(_CAMERA, "Far view depth, may be inf.", "X")] = None
+
+    def given(self) -> Camera | View | None:
+        """The camera file's contents; raises CameraError before anything is rendered."""
+        return None if self.camera is None else read_json(self.camera, parse_camera, CameraError)
+
+    def view(self, scene: Scene) -> Camera | View | None:
+        """The camera to render with: the given one, or the scene's own or automatic view, changed.
+
+        None where nothing was given: the pipeline chooses. Raises CameraError where options
+        contradict.
+        """
+        from ..camera import Camera
+        from ..scenes import framed_view
+
+        options = {
+            "--fov": self.fov,
+            "--orthographic": self.orthographic,
+            "--near": self.near,
+            "--far": self.far,
+        }
+        used = [name for name, value in options.items() if value is not None]
+        given = self.given()
+        if not used:
+            return given
+        if isinstance(given, Camera):
+            raise CameraError(
+                f"{used[0]} cannot change a camera given by matrices; expected a view (eye, "
+                "target) in the camera file: change the matrices, or leave the option out"
+            )
+        if self.fov is not None and self.orthographic is not None:
+            raise CameraError("both --fov and --orthographic are given; expected one of them")
+        view = given or scene.view or framed_view(scene)
+        if self.fov is not None or self.orthographic is not None:
+            view = replace(
+                view,
+                fov_y_degrees=self.fov,
+                orthographic_height=self.orthographic,
+                focal_length=None,
+            )
+        return replace(
+            view,
+            near=view.near if self.near is None else self.near,
+            far=view.far if self.far is None else self.far,
+        )
+
+
+SETTING_OPTIONS: tuple[tuple[str, str, str | None, str], ...] = (
+    (_TRACE, "tracer", "dda|cells|march", "One of them; --method names several."),
+    (_TRACE, "surface", "constant|plane", "What a pixel's surface is."),
+    (_TRACE, "stride", "N", "Pixels between DDA samples."),
+    (_TRACE, "step", "X", "Of the 3-D march; default radius/128."),
+    (_TRACE, "growth", "linear|constant", "Of the march's increments."),
+    (_TRACE, "jitter", None, "Start each ray at its own share of a stride."),
+    (_TRACE, "seed", "N", "Of the jitter."),
+    (_TRACE, "max_steps", "N", "Samples of a ray at most; default no limit."),
+    (_TRACE, "max_distance", "X", "Length of a ray at most, may be inf."),
+    (_TRACE, "bias", "X", "Added to the front of a surface."),
+    (_TRACE, "thickness", "X", "Of a surface without a back face."),
+    (_TRACE, "thickness_from", "back_faces|constant|relative|slope|material", "What thickness is."),
+    (_TRACE, "back_any_object", None, "Back faces of any object, as a GPU's buffer holds them."),
+    (_TRACE, "interval", "column|cell|point|published", "Ray interval of a sample."),
+    (_TRACE, "refine", "auto|rewalk|bisect|secant|none", "What a candidate leads to."),
+    (_TRACE, "refine_steps", "N", "Halvings of the march's refinement."),
+    (_TRACE, "listing", None, "The march as published, with its slips; needs --max-steps."),
+    (_TRACE, "self_rejection", "plane|none", "How the own surface is left."),
+    (_TRACE, "facing_test", None, "Refuse faces that the ray meets from behind."),
+    (_RESOLVE, "edge_fade", None, "Fade towards the image's border."),
+    (_RESOLVE, "edge_power", "X", "Exponent of that fade."),
+    (_RESOLVE, "distance_fade", "none|published|linear", "Fade with the ray's length."),
+    (_RESOLVE, "fresnel", None, "Schlick's Fresnel term."),
+    (_RESOLVE, "max_roughness", "X", "Rougher pixels do not reflect."),
+    (_RESOLVE, "snap", "float64|gpu_vertices", "Vertex positions on screen."),
+    (_RESOLVE, "buffer_dtype", "float32|float64", "Of the G-buffer."),
+)
+"""Panel, name, metavar and help of every setting with an option of its own, as in `--help`.
+
+The metavar tells the type: N a whole number, X a number, a|b words, None on or off. `Settings` is
+not asked, since it needs NumPy and help must be quick; a test compares the two.
+"""
+
+_OTHER_OPTIONS = {
+    "settings": Annotated[
+        Path | None,
+        _option(_TRACE, "Settings, as in a bundle; options win over it.", "FILE.json"),
+    ],
+    "method": Annotated[
+        str | None,
+        _option(_TRACE, "One or several: march, dda, exact, planes.", "NAME[,NAME...]"),
+    ],
+    "size": Annotated[
+        str | None, typer.Option(metavar="WxH", help="Pixels, such as 1920x1080. [960x540]")
+    ],
+    "fallback_color": Annotated[
+        str | None, _option(_RESOLVE, "What a miss shows, linear RGB; default black.", "R,G,B")
+    ],
+}
+
+
+class TraceOptions(Options):
+    """How a scene is rendered: `Settings`, by a file and by options."""
+
+    def __init__(self, **given: Any) -> None:
+        self._given = {name: value for name, value in given.items() if value is not None}
+
+    @classmethod
+    def parameters(cls) -> list[inspect.Parameter]:
+        """One option for each row of `SETTING_OPTIONS`."""
+        annotations: dict[str, Any] = dict(_OTHER_OPTIONS)
+        for panel, name, metavar, text in SETTING_OPTIONS:
+            kind = {None: bool, "N": int, "X": float}.get(metavar, str)
+            annotations[name] = Annotated[kind | None, _option(panel, text, metavar)]
+        return [
+            inspect.Parameter(
+                name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation
+            )
+            for name, annotation in annotations.items()
+        ]
+
+    def methods(self) -> dict[str, Settings]:
+        """The settings of every method asked for, by name; without `--method` one, named ""."""
+        from ..settings import Settings, method_settings
+
+        given = dict(self._given)
+        path, names = given.pop("settings", None), given.pop("method", None)
+        base = Settings() if path is None else read_json(path, Settings.from_json, SettingsError)
+        if "size" in given:
+            given["size"] = parse_size(given["size"])
+        if "fallback_color" in given:
+            given |= {
+                "fallback": "constant",
+                "fallback_color": parse_color(given["fallback_color"]),
+            }
+        if names is None:
+            return {"": replace(base, **given)}
+        if "tracer" in given:
+            raise SettingsError("both --method and --tracer are given; expected one of them")
+        wanted = [name.strip() for name in names.split(",")]
+        for i, name in enumerate(wanted):
+            if name in wanted[:i]:
+                raise SettingsError(f"method '{name}' is named twice; expected each once")
+        return {name: method_settings(name, base, **given) for name in wanted}
