@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -144,7 +145,14 @@ GBUFFER_SETTINGS = ("size", "back_any_object", "fresnel", "max_roughness", "snap
 
 
 def check_same_gbuffer(settings: Settings, other: Settings, name: str) -> None:
-    """Raise SettingsError if a further method would need a G-buffer of its own."""
+    """Raise SettingsError if a further method would need a G-buffer of its own.
+
+    Its name becomes part of array and file names: ASCII letters, digits, _ and - only.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", name):
+        raise SettingsError(
+            f"a method is named {name!r}; expected 1 to 64 ASCII letters, digits, _ and -"
+        )
     keys: tuple[str, ...] = GBUFFER_SETTINGS
     if "material" in (settings.thickness_from, other.thickness_from):
         keys = (*keys, "thickness_from", "thickness")

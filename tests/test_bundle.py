@@ -25,6 +25,7 @@ from ssr_ref.fileio import manifest as manifest_module
 from ssr_ref.fileio.bundle import check_target, finite_range, load_bundle, write_bundle
 from ssr_ref.fileio.exr import read_exr, write_exr
 from ssr_ref.fileio.npz import content_sha256, read_npz, write_npz
+from ssr_ref.pipeline import Traced
 
 ODD_SIZES = [(1, 1), (1, 9), (9, 1), (37, 53), (16, 17)]
 
@@ -185,6 +186,45 @@ def test_stored_arrays_are_the_frames_own_rounded_once(frame, written):
     assert np.array_equal(arrays["hit_uv"], uv, equal_nan=True)
     assert {arrays[n].dtype.str for n in ("status", "end", "flags")} == {"|u1"}
     assert {arrays[n].dtype.str for n in ("steps", "fetches")} == {"<u4"}
+
+
+def test_further_methods_have_arrays_layers_settings_and_pictures_of_their_own(frame, tmp_path):
+    other = made_up_frame((37, 23), seed=2)
+    march = Traced(replace(frame.settings, tracer="march"), other.hits, other.resolved)
+    both = replace(frame, more={"march": march})
+    path = write_bundle(both, tmp_path / "both")
+    bundle = load_bundle(path)
+
+    # The first method's arrays keep every byte; the other's are those of a bundle of its own.
+    alone = load_bundle(write_bundle(frame, tmp_path / "first", previews=False))
+    apart = load_bundle(write_bundle(both.of("march"), tmp_path / "march", previews=False))
+    own = {*frame.hits.arrays(), *frame.resolved.arrays(), "hit_uv"}
+    assert set(bundle.arrays) == {*alone.arrays, *("march." + name for name in own)}
+    for name, array in alone.arrays.items():
+        assert array.tobytes() == bundle.arrays[name].tobytes(), name
+    for name in own:
+        assert apart.arrays[name].tobytes() == bundle.arrays["march." + name].tobytes(), name
+    assert bundle.settings == frame.settings and bundle.more == {"march": march.settings}
+    assert bundle.manifest["content_sha256"] != alone.manifest["content_sha256"]
+    counts = bundle.manifest["methods"]["march"]
+    assert (
+        counts
+        == {k: v for k, v in apart.manifest["statistics"].items() if k != "raster"}
+        != bundle.manifest["statistics"]
+    )
+
+    channels = read_exr(path / "golden.exr")
+    assert np.array_equal(channels["march.status"], other.hits.status)
+    assert np.array_equal(channels["march.R"], other.resolved.composite[..., 0])
+    assert np.array_equal(channels["march.hit.U"], apart.arrays["hit_uv"][..., 0], equal_nan=True)
+    pictures = {p.name for p in (path / "previews" / "march").iterdir()}
+    assert {"status.png", "composite.png", "overview.png"} <= pictures
+    assert not pictures & {"depth.png", "albedo.png", "object_id.png"}
+
+    # Its settings are part of the identity.
+    seeded = replace(march, settings=replace(march.settings, seed=7))
+    third = write_bundle(replace(frame, more={"march": seeded}), tmp_path / "c", previews=False)
+    assert load_bundle(third).manifest["content_sha256"] != bundle.manifest["content_sha256"]
 
 
 def test_every_nan_is_stored_as_the_same_bits(frame):

@@ -269,6 +269,33 @@ def test_every_setting_can_be_given(folder, rendered):
     assert same == []  # every setting was given a value that is not its default
 
 
+def test_methods_are_traced_on_one_gbuffer(folder, rendered, capsys):
+    line = "render triangle.obj -o out --size 5x3 --method dda,exact,planes,march --stride 4"
+    assert run_line(line) == 0
+    first = Settings(size=(5, 3), stride=4)
+    _, _, settings, *more = rendered[0]
+    assert settings == first and more == [
+        ("exact", replace(first, tracer="cells")),
+        ("planes", replace(first, tracer="cells", surface="plane")),
+        ("march", replace(first, tracer="march")),
+    ]
+    out = capsys.readouterr().out
+    assert [line.split()[0] for line in out.split("fetches a ray")[1].splitlines()[1:]] == [
+        "dda", "exact", "planes", "march",
+    ]  # fmt: skip
+    assert run_line("info out") == 0
+    assert "further methods" in capsys.readouterr().out
+
+    # Again from its own files.
+    again = "render triangle.obj -o again --settings out/settings.json --more out/methods.json"
+    assert run_line(again + " --no-previews") == 0
+    assert load_bundle(folder / "again").more == load_bundle(folder / "out").more
+
+    # One method alone, and the DDA with planes.
+    assert run_line("render triangle.obj -o one --method dda --surface plane --no-previews") == 0
+    assert rendered[2][2:] == (Settings(surface="plane"),)
+
+
 def test_scene_options_reach_the_loader(folder, rendered, monkeypatch):
     asked = []
 
@@ -364,6 +391,13 @@ BAD = {
     "render triangle.obj -o out --fov 40 --orthographic 2": "both --fov and --orthographic",
     "render triangle.obj -o out --orthographic 0": "orthographic height 0",
     "render triangle.obj -o out --tracer magic": "tracer is 'magic'",
+    "render triangle.obj -o out --method magic": "method is 'magic'",
+    "render triangle.obj -o out --method dda,,exact": "method is ''",
+    "render triangle.obj -o out --method dda,exact,dda": "'dda' is named twice",
+    "render triangle.obj -o out --method dda --tracer march": "both --method and --tracer",
+    "render triangle.obj -o out --method dda --more list.json": "both --method and --more",
+    "render triangle.obj -o out --method dda,march --refine rewalk": "refine is 'rewalk'",
+    "render triangle.obj -o out --more list.json": "list.json",
     "render triangle.obj -o out --stride 0": "stride is 0",
     "render triangle.obj -o out --stride 1.5": "1.5",
     "render triangle.obj -o out --seed -1": "seed is -1",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .output import Output, length, percent
+from .render import method_table
 
 if TYPE_CHECKING:
     from ..fileio.bundle import Bundle
@@ -48,6 +49,8 @@ def _print(out: Output, bundle: Bundle) -> None:
         ("content sha256", manifest["content_sha256"]),
     ]
     out.facts(lines + [("warning", text) for text in manifest["warnings"]])
+    if "methods" in manifest:
+        method_table(out, "further methods", manifest["methods"])
     out.table("statuses", ("status", "number", "pixels", "share"), _statuses(manifest))
     out.table(
         "arrays", ("array", "dtype", "shape", "least", "greatest", "not finite"), _arrays(bundle)

@@ -251,6 +251,10 @@ _OTHER_OPTIONS = {
         str | None,
         _option(_TRACE, "One or several: march, dda, exact, planes.", "NAME[,NAME...]"),
     ],
+    "more": Annotated[
+        Path | None,
+        _option(_TRACE, "Settings of further methods, as a bundle's methods.json.", "FILE.json"),
+    ],
     "size": Annotated[
         str | None, typer.Option(metavar="WxH", help="Pixels, such as 1920x1080. [960x540]")
     ],
@@ -285,7 +289,7 @@ class TraceOptions(Options):
         from ..settings import Settings, method_settings
 
         given = dict(self._given)
-        path, names = given.pop("settings", None), given.pop("method", None)
+        path, names, more = (given.pop(name, None) for name in ("settings", "method", "more"))
         base = Settings() if path is None else read_json(path, Settings.from_json, SettingsError)
         if "size" in given:
             given["size"] = parse_size(given["size"])
@@ -295,11 +299,21 @@ class TraceOptions(Options):
                 "fallback_color": parse_color(given["fallback_color"]),
             }
         if names is None:
-            return {"": replace(base, **given)}
-        if "tracer" in given:
-            raise SettingsError("both --method and --tracer are given; expected one of them")
+            further = {} if more is None else read_json(more, _settings_by_name, SettingsError)
+            return {"": replace(base, **given), **further}
+        for name, other in (("tracer", given.get("tracer")), ("more", more)):
+            if other is not None:
+                raise SettingsError(f"both --method and --{name} are given; expected one of them")
         wanted = [name.strip() for name in names.split(",")]
         for i, name in enumerate(wanted):
             if name in wanted[:i]:
                 raise SettingsError(f"method '{name}' is named twice; expected each once")
         return {name: method_settings(name, base, **given) for name in wanted}
+
+
+def _settings_by_name(data: Any) -> dict[str, Settings]:
+    from ..settings import Settings
+
+    if not isinstance(data, dict):
+        raise SettingsError(f"methods are a {type(data).__name__}; expected settings by name")
+    return {name: Settings.from_json(own) for name, own in data.items()}

@@ -121,16 +121,21 @@ def _report(out: Output, frame: Frame, first: str, output: Path, seconds: float)
         ]
     )
     if methods:
-        rows = [
-            (
-                name,
-                percent(facts["hits"], facts["rays"]),
-                f"{facts['steps'] / max(facts['rays'], 1):.1f}",
-                f"{facts['fetches'] / max(facts['rays'], 1):.1f}",
-            )
-            for name, facts in {first: counts, **methods}.items()
-        ]
-        out.table("methods", ("method", "hits", "steps a ray", "fetches a ray"), rows)
+        method_table(out, "methods", {first or "first": counts, **methods})
+
+
+def method_table(out: Output, title: str, methods: dict[str, Any]) -> None:
+    """One line a method: hits, and the work of a ray."""
+    rows = [
+        (
+            name,
+            percent(counts["hits"], counts["rays"]),
+            f"{counts['steps'] / max(counts['rays'], 1):.1f}",
+            f"{counts['fetches'] / max(counts['rays'], 1):.1f}",
+        )
+        for name, counts in methods.items()
+    ]
+    out.table(title, ("method", "hits", "steps a ray", "fetches a ray"), rows)
 
 
 def _method_facts(frame: Frame) -> dict[str, Any]:
