@@ -171,12 +171,15 @@ def make_camera(
     """The camera to use; a view's missing near plane is 2⁻¹⁰ of the scene's radius."""
     if isinstance(camera, Camera):
         return camera
-    view = camera or scene.view
-    if view is None and isinstance(scene, Scene):
-        view = framed_view(scene)
-    elif view is None:
-        view = view_of_bounds(*scene.world_bounds())
+    view = camera or own_view(scene)
     return view.camera(settings.size, NEAR_PER_RADIUS * radius)
+
+
+def own_view(scene: Scene | AnalyticScene) -> View:
+    """The scene's own view, or one framed on its bounds."""
+    if scene.view is not None:
+        return scene.view
+    return framed_view(scene) if isinstance(scene, Scene) else view_of_bounds(*scene.world_bounds())
 
 
 def raster_options(settings: Settings, *others: Settings) -> RasterOptions:

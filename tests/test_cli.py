@@ -413,6 +413,10 @@ BAD = {
     "render missing.obj -o out": "missing.obj",
     "render no_such_scene -o out": "no_such_scene",
     "render notes.txt -o out": "notes.txt",
+    "render analytic/no_such -o out": "expected analytic/ and one of marker",
+    "render analytic/marker -o out --up z": "expected none but --lights",
+    "render list.json -o out": "not a closed-form scene",
+    "render missing.json -o out": "missing.json",
     "render . -o out": "unknown scene",
     "render points.ply -o out": "no triangles",
     "render nan.obj -o out": "finite",
@@ -654,14 +658,28 @@ def test_output_that_cannot_be_printed_is_one_line(golden):
 
 
 def test_scenes(capsys):
+    from ssr_ref.analytic.scenes import SCENES
     from ssr_ref.scenes import BUILTIN
 
+    names = [*BUILTIN, *("analytic/" + name for name in SCENES)]
     assert run_line("scenes") == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == list(BUILTIN)
+    assert [line.split()[0] for line in lines] == names
     assert run_line("scenes --json") == 0
     told = json.loads(capsys.readouterr().out)
-    assert told == {name: builtin.description for name, builtin in BUILTIN.items()}
+    assert list(told) == sorted(names)
+    assert all(told[name] == builtin.description for name, builtin in BUILTIN.items())
+
+
+def test_closed_form_scenes_by_name_and_by_file(folder, capsys):
+    line = "render analytic/marker -o out --size 8x8 --buffer-dtype float64 --no-previews"
+    assert run_line(line) == 0
+    assert "surfaces" in capsys.readouterr().out
+    files = "--camera out/camera.json --settings out/settings.json --lights out/lights.json"
+    assert run_line(f"render out/scene.json -o again {files} --no-previews -q") == 0
+    first, again = load_bundle(folder / "out"), load_bundle(folder / "again")
+    assert first.manifest["content_sha256"] == again.manifest["content_sha256"]
+    assert first.scene.name == "marker"
 
 
 # Progress

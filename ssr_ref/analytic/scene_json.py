@@ -28,11 +28,13 @@ def scene_to_json(scene: AnalyticScene) -> dict[str, Any]:
         "format": FORMAT,
         "name": scene.name,
         "shapes": [_shape_to_json(shape) for shape in scene.shapes],
-        "materials": [
-            {"name": m.name, **{name: getattr(m, name) for name in _FACTORS}}
-            for m in scene.materials
-        ],
+        "materials": [_material_to_json(m) for m in scene.materials],
     }
+
+
+def _material_to_json(material: Material) -> dict[str, Any]:
+    own = {} if material.thickness is None else {"thickness": material.thickness}
+    return {"name": material.name, **{n: getattr(material, n) for n in _FACTORS}, **own}
 
 
 def _shape_to_json(shape: Shape) -> dict[str, Any]:

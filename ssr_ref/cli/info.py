@@ -31,12 +31,15 @@ def info(
 
 
 def _print(out: Output, bundle: Bundle) -> None:
+    from ..fileio.bundle import SHAPES_FILE
+
     manifest = bundle.manifest
     scene, statistics = manifest["scene"], manifest["statistics"]
     width, height = manifest["size"]
+    what = "surfaces" if SHAPES_FILE in manifest["files"] else "triangles"
     lines = [
         ("bundle", str(bundle.path)),
-        ("scene", f"{scene['name']} ({scene['triangles']} triangles, {scene['objects']} objects)"),
+        ("scene", f"{scene['name']} ({scene['triangles']} {what}, {scene['objects']} objects)"),
         ("size", f"{width}x{height}"),
         *_camera(bundle),
         *_settings(bundle),

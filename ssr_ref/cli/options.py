@@ -25,6 +25,7 @@ from ..errors import CameraError, SceneError, SettingsError
 from .parsing import parse_camera, parse_color, parse_scene, parse_size, read_json
 
 if TYPE_CHECKING:
+    from ..analytic.scene import AnalyticScene
     from ..camera import Camera, View
     from ..meshfiles.options import NormalsName, UpName
     from ..scene import Scene
@@ -120,11 +121,19 @@ class SceneOptions(Options):
         """Raise what can be found wrong before the scene is read."""
         self._lights()
 
-    def load(self, scene: str) -> Scene:
+    def load(self, scene: str) -> Scene | AnalyticScene:
         """The scene of a name or a file."""
-        from ..fileio.load import load
+        from ..fileio.load import load, load_closed_form
 
         lights = self._lights()
+        shapes = load_closed_form(scene)
+        if shapes is not None:
+            if replace(self, lights=None) != SceneOptions():
+                raise SettingsError(
+                    f"options of mesh scenes are given for the closed-form scene {scene}; expected "
+                    "none but --lights"
+                )
+            return shapes if lights is None else shapes.with_lights(lights)
         loaded = load(
             scene,
             normals=cast("NormalsName", self.normals),  # checked where they are used
@@ -167,14 +176,14 @@ class CameraOptions(Options):
         """The camera file's contents; raises CameraError before anything is rendered."""
         return None if self.camera is None else read_json(self.camera, parse_camera, CameraError)
 
-    def view(self, scene: Scene) -> Camera | View | None:
+    def view(self, scene: Scene | AnalyticScene) -> Camera | View | None:
         """The camera to render with: the given one, or the scene's own or automatic view, changed.
 
         None where nothing was given: the pipeline chooses. Raises CameraError where options
         contradict.
         """
         from ..camera import Camera
-        from ..scenes import framed_view
+        from ..pipeline import own_view
 
         options = {
             "--fov": self.fov,
@@ -193,7 +202,7 @@ class CameraOptions(Options):
             )
         if self.fov is not None and self.orthographic is not None:
             raise CameraError("both --fov and --orthographic are given; expected one of them")
-        view = given or scene.view or framed_view(scene)
+        view = given or own_view(scene)
         if self.fov is not None or self.orthographic is not None:
             view = replace(
                 view,

@@ -24,9 +24,7 @@ def render(
     ctx: typer.Context,
     scene: Annotated[
         str,
-        typer.Argument(
-            metavar="SCENE", help="A mesh file, or the name of a built-in scene (`scenes`)."
-        ),
+        typer.Argument(metavar="SCENE", help="A mesh file, or a name that `ssr-ref scenes` lists."),
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="DIR", help="Folder that is created.")
@@ -97,11 +95,12 @@ def _report(out: Output, frame: Frame, first: str, output: Path, seconds: float)
         )
         return
     settings, seen = frame.settings, counts["status"]
+    what = "triangles" if isinstance(frame.scene, Scene) else "surfaces"
     common = sorted(seen, key=lambda name: -seen[name])
     out.facts(
         [
             ("golden bundle", str(output)),
-            ("scene", f"{frame.scene.name} ({frame.scene.triangle_count} triangles)"),
+            ("scene", f"{frame.scene.name} ({frame.scene.triangle_count} {what})"),
             *(load_rows(frame.scene) if out.verbose and isinstance(frame.scene, Scene) else ()),
             ("size", f"{width}x{height}"),
             (

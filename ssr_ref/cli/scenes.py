@@ -21,17 +21,23 @@ def scenes(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a page that is there.")] = False,
 ) -> None:
-    """List the built-in scenes."""
+    """List the built-in scenes: meshes, and shapes in closed form."""
+    from ..analytic.scenes import SCENES
+    from ..fileio.load import CLOSED_FORM
     from ..scenes import BUILTIN
 
     out: Output = ctx.obj
+    found = {name: builtin.description for name, builtin in BUILTIN.items()}
+    for name, make in SCENES.items():
+        first = (make.__doc__ or "").strip().splitlines()[0]
+        found[CLOSED_FORM + name] = first[:1].lower() + first[1:].removesuffix(".")
     if html is None:
         if force:
             raise SettingsError("--force is given without --html; expected both, or neither")
         if out.json:
-            out.data({name: builtin.description for name, builtin in BUILTIN.items()})
+            out.data(found)
         else:
-            out.facts([(name, builtin.description) for name, builtin in BUILTIN.items()])
+            out.facts(list(found.items()))
         return
 
     from ..report.scene_list import write_scene_page

@@ -1,14 +1,25 @@
-"""`load`: a scene by the name of a built-in one or by a mesh file's path."""
+"""`load`: a scene by the name of a built-in one or by a mesh file's path.
+
+`load_closed_form` does it for scenes of shapes, which are of another class.
+"""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ..errors import FileError, SettingsError
+from ..errors import FileError, SettingsError, SsrRefError
 from ..meshfiles.meshes import FORMATS, load_mesh, with_normals
 from ..meshfiles.options import LoadOptions, NormalsName, UpName
 from ..scene import Scene
+
+if TYPE_CHECKING:
+    from ..analytic.scene import AnalyticScene
+
+CLOSED_FORM = "analytic/"
+"""What the name of a closed-form scene begins with where scenes of both kinds are named."""
 
 
 def load(
@@ -65,3 +76,33 @@ def load(
             f"a mesh file ({', '.join(FORMATS)}): check the spelling"
         )
     return scenes.with_mirror_floor(loaded) if mirror_floor else loaded
+
+
+def load_closed_form(source: str) -> AnalyticScene | None:
+    """A scene of shapes by "analytic/NAME" or by the path of a scene.json; None for anything else.
+
+    Raises FileError for an unknown name or a file that cannot be used.
+    """
+    if source.startswith(CLOSED_FORM):
+        from ..analytic.scenes import SCENES
+
+        name = source.removeprefix(CLOSED_FORM)
+        if name not in SCENES:
+            raise FileError(
+                f"unknown scene {source!r}; expected {CLOSED_FORM} and one of {', '.join(SCENES)}"
+            )
+        return SCENES[name]()
+    if Path(source).suffix.lower() != ".json":
+        return None
+    from ..analytic.scene_json import scene_from_json
+
+    try:
+        return scene_from_json(json.loads(Path(source).read_bytes()))
+    except OSError as error:
+        raise FileError(
+            f"{source} cannot be read ({error.strerror}); expected a closed-form scene"
+        ) from None
+    except (ValueError, RecursionError) as error:
+        raise FileError(f"{source} is not JSON ({error}); expected a closed-form scene") from None
+    except SsrRefError as error:
+        raise FileError(f"{source}: {error}") from None
