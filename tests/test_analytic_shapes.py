@@ -125,6 +125,15 @@ def test_json_gives_the_same_bits_back(name: str) -> None:
     again = scene_from_json(json.loads(text))
     assert again.content_sha256() == scene.content_sha256()
     assert json.dumps(scene_to_json(again)) == text
+
+
+def test_json_keeps_a_materials_own_thickness() -> None:
+    plain = scene_of(Sphere((0, 0, 0), 1.0))
+    first = replace(plain.materials[0], thickness=0.1)
+    scene = replace(plain, materials=(first, *plain.materials[1:]))
+    again = scene_from_json(json.loads(json.dumps(scene_to_json(scene))))
+    assert again.materials == scene.materials
+    assert again.content_sha256() == scene.content_sha256() != plain.content_sha256()
     assert again.materials == scene.materials
 
 
