@@ -6,7 +6,7 @@ import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -82,9 +82,45 @@ def render(
     G-buffer (`check_same_gbuffer`). progress: called with stage and share done.
     Raises SceneError, CameraError or SettingsError.
     """
-    stages = _Stages(progress)
-    settings = settings or Settings()
-    others = dict(more or {})
+    stages = Stages(progress)
+    drawn = draw_gbuffer(scene, camera, settings or Settings(), more or {}, stages)
+    traced = trace_method(drawn.view, drawn.gbuffer, drawn.settings, stages, "")
+    return Frame(
+        scene=scene,
+        camera=drawn.camera,
+        settings=drawn.settings,
+        gbuffer=drawn.gbuffer,
+        hits=traced.hits,
+        resolved=traced.resolved,
+        warnings=drawn.warnings,
+        timings=stages.seconds,
+        more={
+            name: trace_method(drawn.view, drawn.gbuffer, other, stages, " " + name)
+            for name, other in drawn.more.items()
+        },
+    )
+
+
+class Drawn(NamedTuple):
+    """A G-buffer before anything is traced; settings and `more` are resolved."""
+
+    camera: Camera
+    view: ViewParams
+    settings: Settings
+    more: dict[str, Settings]
+    gbuffer: GBuffer
+    warnings: tuple[str, ...]
+
+
+def draw_gbuffer(
+    scene: Scene | AnalyticScene,
+    camera: Camera | View | None,
+    settings: Settings,
+    more: Mapping[str, Settings],
+    stages: Stages,
+) -> Drawn:
+    """The part of `render` before tracing: camera, geometry, G-buffer."""
+    others = dict(more)
     for name, other in others.items():
         check_same_gbuffer(settings, other, name)
 
@@ -112,25 +148,12 @@ def render(
         with stages("raster"):
             gbuffer = cast_gbuffer(scene, camera, settings, *others.values())
     gbuffer = with_thickness(gbuffer, scene, settings)
-    traced = trace_method(view, gbuffer, settings, stages, "")
-    return Frame(
-        scene=scene,
-        camera=camera,
-        settings=settings,
-        gbuffer=gbuffer,
-        hits=traced.hits,
-        resolved=traced.resolved,
-        warnings=(*scene.notes, *frame_warnings(scene, materials, gbuffer, settings)),
-        timings=stages.seconds,
-        more={
-            name: trace_method(view, gbuffer, other, stages, " " + name)
-            for name, other in others.items()
-        },
-    )
+    told = (*scene.notes, *frame_warnings(scene, materials, gbuffer, settings))
+    return Drawn(camera, view, settings, others, gbuffer, told)
 
 
 def trace_method(
-    view: ViewParams, gbuffer: GBuffer, settings: Settings, stages: _Stages, suffix: str
+    view: ViewParams, gbuffer: GBuffer, settings: Settings, stages: Stages, suffix: str
 ) -> Traced:
     """Trace and resolve; the stages' names get the suffix."""
     with stages("trace" + suffix):
@@ -290,7 +313,7 @@ def frame_warnings(
     return lines
 
 
-class _Stages:
+class Stages:
     """Times each stage and tells progress about it."""
 
     def __init__(self, progress: Progress | None) -> None:
@@ -299,7 +322,7 @@ class _Stages:
         self._name = ""
         self._start = 0.0
 
-    def __call__(self, name: str) -> _Stages:
+    def __call__(self, name: str) -> Stages:
         self._name = name
         return self
 
