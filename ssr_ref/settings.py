@@ -66,7 +66,8 @@ class Settings:
         above stride 1. Of the march: "bisect" between the last two samples, "secant" a secant step
         after it, "none"; "auto": bisect.
     refine_steps : halvings of the march's refinement, 0 to 64.
-    listing : the march as published, with its slips (docs/errata_tracers.md); needs max_steps.
+    listing : the march or the DDA as published, with its slips (docs/errata_tracers.md); needs
+        max_steps.
     self_rejection : "plane" refuses hits under the origin's tangent plane; "none".
     facing_test : refuse a candidate whose geometric normal the ray does not go against.
     edge_fade : whether confidence falls towards the image's border; edge_power its exponent, above
@@ -139,7 +140,7 @@ class Settings:
             return self.refine
         if self.tracer == "march":
             return "bisect"
-        return "rewalk" if self.stride > 1 else "none"
+        return "rewalk" if self.stride > 1 and not self.listing else "none"
 
     @property
     def tracer_edge_power(self) -> float:
@@ -251,13 +252,8 @@ def _check_tracer(settings: Settings) -> None:
         raise SettingsError(
             f"refine is '{settings.refine}'; expected one of {listed} with tracer '{tracer}'"
         )
-    if settings.listing and (tracer != "march" or settings.max_steps is None):
-        raise SettingsError(
-            f"listing is True with tracer '{tracer}' and max_steps {settings.max_steps}; expected "
-            "tracer 'march' and a max_steps: nothing else ends the published loop"
-        )
-    if settings.listing and settings.refine == "secant":
-        raise SettingsError("refine is 'secant' with listing; expected auto, bisect or none")
+    if settings.listing:
+        _check_listing(settings)
     if tracer != "march":
         return
     if settings.surface != "constant":
@@ -278,6 +274,28 @@ def _check_tracer(settings: Settings) -> None:
             f"{'2^-7 r' if step is None else format(step, 'g')}; expected fewer: set max_steps, a "
             "longer step or a shorter max_distance"
         )
+
+
+def _check_listing(settings: Settings) -> None:
+    """What the published listings have not."""
+    tracer = settings.tracer
+    if tracer == "cells" or settings.max_steps is None:
+        raise SettingsError(
+            f"listing is True with tracer '{tracer}' and max_steps {settings.max_steps}; expected "
+            "tracer 'march' or 'dda' and a max_steps: nothing else ends the published loop in time"
+        )
+    expected = ("auto", "bisect", "none") if tracer == "march" else ("auto", "none")
+    if settings.refine not in expected:
+        raise SettingsError(
+            f"refine is '{settings.refine}' with listing; expected one of {', '.join(expected)}"
+        )
+    if tracer == "march":
+        return
+    for name, only in (("surface", "constant"), ("interval", "column")):
+        if getattr(settings, name) != only:
+            raise SettingsError(
+                f"{name} is '{getattr(settings, name)}' with listing; expected '{only}'"
+            )
 
 
 def _whole(settings: Settings, name: str, low: int, high: int) -> None:

@@ -397,7 +397,7 @@ def test_endless_marches_are_refused() -> None:
         ({"refine": "rewalk"}, "refine"),
         ({"tracer": "dda", "refine": "secant"}, "refine"),
         ({"listing": True}, "max_steps"),
-        ({"tracer": "dda", "listing": True, "max_steps": 5}, "tracer"),
+        ({"tracer": "cells", "listing": True, "max_steps": 5}, "tracer"),
         ({"listing": True, "max_steps": 5, "refine": "secant"}, "secant"),
         ({"step": 0.0}, "step"),
         ({"step": np.inf}, "step"),

@@ -234,7 +234,7 @@ SETTING_OPTIONS: tuple[tuple[str, str, str | None, str], ...] = (
     (_TRACE, "interval", "column|cell|point|published", "Ray interval of a sample."),
     (_TRACE, "refine", "auto|rewalk|bisect|secant|none", "What a candidate leads to."),
     (_TRACE, "refine_steps", "N", "Halvings of the march's refinement."),
-    (_TRACE, "listing", None, "The march as published, with its slips; needs --max-steps."),
+    (_TRACE, "listing", None, "March or DDA as published, slips included; needs --max-steps."),
     (_TRACE, "self_rejection", "plane|none", "How the own surface is left."),
     (_TRACE, "facing_test", None, "Refuse faces that the ray meets from behind."),
     (_RESOLVE, "edge_fade", None, "Fade towards the image's border."),

@@ -132,7 +132,8 @@ def trace_pixel(
 ) -> PixelWalk:
     """The whole walk of pixel (x, y)'s ray; what `trace` needs, this does too.
 
-    Raises SettingsError for a pixel outside the image, and for the 3-D march, which has no log.
+    Raises SettingsError for a pixel outside the image, and for the 3-D march and the published
+    listings, which have no log.
     """
     if not (0 <= x < view.width and 0 <= y < view.height):
         raise SettingsError(
@@ -141,6 +142,8 @@ def trace_pixel(
         )
     if settings.tracer == "march":
         raise SettingsError("tracer is 'march'; expected 'dda' or 'cells': the march has no log")
+    if settings.listing:
+        raise SettingsError("listing is True; expected False: the published walk has no log")
     prepared = prepare(view, gbuffer, settings)
     record: Any = record_plane_pixel if settings.surface == "plane" else record_slab_pixel
     log = new_log(ROOM)

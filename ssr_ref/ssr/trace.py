@@ -17,9 +17,8 @@ from ..settings import Settings
 from ..typed import F64Array, FloatArray
 from ..vecmath.noise import jitter
 from ..vecmath.vec import dot
-from . import march_view
+from . import listing_dda, listing_march, march_view
 from .hit import SlabRules, load3
-from .listing_march import ALL_SLIPS, trace_listing_rows
 from .march_cells import CellWalk, march_cells
 from .march_dda import (
     BISECT,
@@ -190,14 +189,16 @@ def trace(
     gbuffer: GBuffer,
     settings: Settings,
     progress: Callable[[float], None] | None = None,
+    slips: int | None = None,
 ) -> HitBuffer:
     """Trace all rays of a G-buffer.
 
     Needs depth, geo_normal_vs, normal_vs and reflectivity, and back_depth if `thickness_from` is
     "back_faces". settings must be resolved (no length None). progress is called with the share
-    of rows done.
+    of rows done. slips: bits of the published listing that are on, with `Settings.listing`; None:
+    all of them.
     """
-    prepared = prepare(view, gbuffer, settings)
+    prepared = prepare(view, gbuffer, settings, slips)
     for row0, row1 in row_chunks(view.height, 1 if progress is None else 32):
         prepared.rows(view, row0, row1, *prepared.fixed, prepared.inputs, prepared.out)
         if progress is not None:
@@ -205,7 +206,9 @@ def trace(
     return prepared.hits
 
 
-def prepare(view: ViewParams, gbuffer: GBuffer, settings: Settings) -> Prepared:
+def prepare(
+    view: ViewParams, gbuffer: GBuffer, settings: Settings, slips: int | None = None
+) -> Prepared:
     """Slabs or planes of every pixel, empty outputs, and the driver for these settings."""
     if settings.thickness is None or settings.max_distance is None:
         raise SettingsError("thickness or max_distance is None; expected Settings.resolved(radius)")
@@ -262,9 +265,17 @@ def prepare(view: ViewParams, gbuffer: GBuffer, settings: Settings) -> Prepared:
         fixed = (max_steps, max_distance, most, bias, rounding, *rejects, slabs)
         if settings.listing:
             hits = replace(hits, fade_px=np.empty((*shape, 2)), fade_length=np.empty(shape))
-            rows = trace_listing_rows
-            fixed = (*march_arguments(settings), max_steps, max_distance, ALL_SLIPS)
-            fixed = (*fixed, slabs, hits.fade_px, hits.fade_length)
+            fades = (slabs, hits.fade_px, hits.fade_length)
+            if settings.tracer == "march":
+                rows = listing_march.trace_listing_rows
+                slips = listing_march.ALL_SLIPS if slips is None else slips
+                fixed = (*march_arguments(settings), max_steps, max_distance, slips, *fades)
+            else:
+                rows = listing_dda.trace_listing_dda_rows
+                slips = listing_dda.ALL_SLIPS if slips is None else slips
+                constant = thickness if model == CONSTANT else 0.0
+                lengths = (max_distance, constant, most, bias, rounding)
+                fixed = (*start[1:], max_steps, *lengths, *rejects, slips, *fades)
         elif settings.tracer == "march":
             rows = trace_march_rows
             fixed = (*march_arguments(settings), *fixed)
