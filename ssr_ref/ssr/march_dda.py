@@ -127,6 +127,7 @@ def bisect(
     slabs: F64Array,
     depth: FloatArray,
     back: FloatArray,
+    normal: FloatArray,
     ray: Ray,
     a: float,
     b: float,
@@ -135,7 +136,8 @@ def bisect(
     """Halve [a, b] down to half a pixel, keeping the half whose end is behind its front.
 
     The hit at the deeper end's pixel, and the reads. It assumes one change of sign: an interval
-    whose end lies in no slab gives no hit, and the sample's own is kept.
+    whose end lies in no slab, or in a pixel that is refused, gives no hit, and the sample's own is
+    kept.
     """
     fetches = 0
     width = b - a
@@ -161,6 +163,9 @@ def bisect(
         low == np.inf
         or compare_with_slab(depth_at(ray, a), depth_at(ray, b), low, slabs[y, x, 1]) != IN_SLAB
     ):
+        return no_hit(), fetches
+    z_front = np.float64(depth[y, x])
+    if refusal(view, rules, ray, x, y, z_front, load3(normal, y, x)) != 0:
         return no_hit(), fetches
     slab = load_slab(slabs, depth, back, x, y)
     return locate_hit(rules, ray, slab, x, y, a, b, False), fetches
@@ -265,7 +270,9 @@ def march_dda(
             slab = load_slab(slabs, depth, back, x, y)
             hit = locate_hit(rules, ray, slab, x, y, near, far, interval == CELL)
             if refine == BISECT:
-                better, reads_more = bisect(view, rules, slabs, depth, back, ray, near, far, reads)
+                better, reads_more = bisect(
+                    view, rules, slabs, depth, back, normal, ray, near, far, reads
+                )
                 fetches += reads_more
                 if better.found:
                     hit = better
