@@ -143,6 +143,8 @@ class Resolved:
 
     edge_fade, distance_fade, confidence (H, W): 0 to 1, 0 where there is no hit; with
     `Settings.listing` edge_fade and confidence may be below 0.
+    steps_fade, facing_fade, residual_fade (H, W): so too; None where the fade is off. confidence is
+    edge · distance · steps · facing · residual, multiplied in this order.
     reflection (H, W, 3): c·L_hit + (1 − c)·F, before the surface's R, 0 where no ray was asked for.
     composite (H, W, 3): L·(1 − R) + R·reflection.
     """
@@ -152,6 +154,9 @@ class Resolved:
     confidence: FloatArray
     reflection: FloatArray
     composite: FloatArray
+    steps_fade: FloatArray | None = None
+    facing_fade: FloatArray | None = None
+    residual_fade: FloatArray | None = None
 
     def arrays(self) -> dict[str, AnyArray]:
         """The buffers by name."""

@@ -22,7 +22,14 @@ IntervalName = Literal["column", "cell", "point", "published"]
 RefineName = Literal["auto", "rewalk", "bisect", "secant", "none"]
 GrowthName = Literal["linear", "constant"]
 SelfRejection = Literal["plane", "none"]
-DistanceFade = Literal["none", "published", "linear"]
+EdgeShape = Literal["power", "smoothstep"]
+EdgeCombine = Literal["product", "sum", "max", "area"]
+EdgeUnit = Literal["axis", "height", "mean"]
+DistanceFade = Literal["none", "published", "linear", "squared"]
+StepsFade = Literal["none", "linear", "power"]
+FacingFade = Literal["none", "linear", "smoothstep"]
+FacingMeasure = Literal["ray", "axis"]
+ResidualFade = Literal["none", "linear", "smoothstep"]
 FallbackName = Literal["none", "constant"]
 SnapName = Literal["float64", "gpu_vertices"]
 BufferDtype = Literal["float32", "float64"]
@@ -71,8 +78,23 @@ class Settings:
     self_rejection : "plane" refuses hits under the origin's tangent plane; "none".
     facing_test : refuse a candidate whose geometric normal the ray does not go against.
     edge_fade : whether confidence falls towards the image's border; edge_power its exponent, above
-        0; None: 2 for the march, else 3.
-    distance_fade : "none", "published" 0.75^(length/max) or "linear".
+        0; None: 2 for the march, else 3. Formulas of all fades: docs/fades.md.
+    edge_shape : "power" t^edge_power or "smoothstep" 3t² − 2t³ of the way t through edge_range.
+    edge_range : (start, end) of an axis' fade; 0 the image's middle, 1 its border; start below end.
+    edge_unit : how far from the border is measured: in halves of the "axis" itself, of the
+        "height", or of the "mean" of width and height.
+    edge_combine : both axes' fades: "product", "sum" of what they take, "max" of it, or "area",
+        the product of both distances to the border.
+    distance_fade : "none", "published" 0.75^(length/max), "linear" or "squared" (1 − length/max)².
+    distance_start : share of max_distance up to which the last two are 1, 0 to below 1.
+    steps_fade : "none", "linear" 1 − g, "power" (1 − g)^steps_fade_out · g^steps_fade_in, of the
+        share g of max_steps, which it needs.
+    facing_fade : "none", "linear" or "smoothstep" from 1 to 0 over facing_range (start, end) of how
+        far the ray comes towards the eye, −1 to 1.
+    facing_measure : that number: "ray" −I·R, or "axis" the reflected ray's own z.
+    residual_fade : "none", or (1 − t)^residual_power of the share t of residual_end that the hit
+        lies behind the surface, "linear" or by "smoothstep".
+    residual_end : scene units, above 0, may be inf; None: the thickness.
     fresnel : Schlick's term, with f0 = 0.04 for dielectrics.
     fallback : what a miss shows: "none" (0) or "constant" (fallback_color, linear RGB).
     max_roughness : rougher pixels do not reflect.
@@ -102,7 +124,21 @@ class Settings:
     facing_test: bool = False
     edge_fade: bool = True
     edge_power: float | None = None
+    edge_shape: EdgeShape = "power"
+    edge_range: tuple[float, float] = (0.0, 1.0)
+    edge_unit: EdgeUnit = "axis"
+    edge_combine: EdgeCombine = "product"
     distance_fade: DistanceFade = "none"
+    distance_start: float = 0.0
+    steps_fade: StepsFade = "none"
+    steps_fade_out: float = 1.0
+    steps_fade_in: float = 0.0
+    facing_fade: FacingFade = "none"
+    facing_measure: FacingMeasure = "ray"
+    facing_range: tuple[float, float] = (0.0, 1.0)
+    residual_fade: ResidualFade = "none"
+    residual_end: float | None = None
+    residual_power: float = 1.0
     fresnel: bool = False
     fallback: FallbackName = "none"
     fallback_color: Rgb = (0.0, 0.0, 0.0)
@@ -132,6 +168,7 @@ class Settings:
             )
         object.__setattr__(self, "fallback_color", color)
         _check_tracer(self)
+        _check_fades(self)
 
     @property
     def refinement(self) -> RefineName:
@@ -141,6 +178,16 @@ class Settings:
         if self.tracer == "march":
             return "bisect"
         return "rewalk" if self.stride > 1 and not self.listing else "none"
+
+    @property
+    def plain_edge(self) -> bool:
+        """Whether the edge fade has the default form Π (1 − (2·|c − ½|)^edge_power)."""
+        return (self.edge_shape, self.edge_range, self.edge_unit, self.edge_combine) == (
+            "power",
+            (0.0, 1.0),
+            "axis",
+            "product",
+        )
 
     @property
     def tracer_edge_power(self) -> float:
@@ -153,12 +200,18 @@ class Settings:
         return self.tracer_edge_power if self.edge_power is None else self.edge_power
 
     def resolved(self, radius: float) -> Settings:
-        """The same settings with every default filled in, lengths from the scene's radius."""
+        """The same settings with every default filled in, lengths from the scene's radius.
+
+        residual_end stays None where its fade is off.
+        """
+        thickness = THICKNESS_PER_RADIUS * radius if self.thickness is None else self.thickness
+        faded = self.residual_fade != "none" and self.residual_end is None
         return replace(
             self,
             step=STEP_PER_RADIUS * radius if self.step is None else self.step,
             edge_power=self.edge_exponent,
-            thickness=THICKNESS_PER_RADIUS * radius if self.thickness is None else self.thickness,
+            thickness=thickness,
+            residual_end=thickness if faded else self.residual_end,
             max_distance=(
                 MAX_DISTANCE_PER_RADIUS * radius if self.max_distance is None else self.max_distance
             ),
@@ -216,7 +269,14 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "refine": get_args(RefineName),
     "growth": get_args(GrowthName),
     "self_rejection": get_args(SelfRejection),
+    "edge_shape": get_args(EdgeShape),
+    "edge_unit": get_args(EdgeUnit),
+    "edge_combine": get_args(EdgeCombine),
     "distance_fade": get_args(DistanceFade),
+    "steps_fade": get_args(StepsFade),
+    "facing_fade": get_args(FacingFade),
+    "facing_measure": get_args(FacingMeasure),
+    "residual_fade": get_args(ResidualFade),
     "fallback": get_args(FallbackName),
     "snap": get_args(SnapName),
     "buffer_dtype": get_args(BufferDtype),
@@ -296,6 +356,47 @@ def _check_listing(settings: Settings) -> None:
             raise SettingsError(
                 f"{name} is '{getattr(settings, name)}' with listing; expected '{only}'"
             )
+
+
+def _check_fades(settings: Settings) -> None:
+    for name in ("distance_start", "steps_fade_out", "steps_fade_in", "residual_power"):
+        if getattr(settings, name) is None:
+            raise SettingsError(f"{name} is None; expected a number")
+        _number(settings, name, least=0.0)
+    if settings.distance_start >= 1.0:
+        raise SettingsError(f"distance_start is {settings.distance_start:g}; expected 0 to below 1")
+    _number(settings, "residual_end", above=0.0, inf=True)
+    _number(settings, "residual_power", above=0.0)
+    _range(settings, "edge_range")
+    _range(settings, "facing_range")
+    if settings.steps_fade != "none" and settings.max_steps is None:
+        raise SettingsError(
+            f"steps_fade is '{settings.steps_fade}' without max_steps; expected a max_steps, of "
+            "which the fade takes its share"
+        )
+    if settings.residual_fade != "none" and settings.residual_end is None:
+        if settings.thickness_from == "relative" or settings.thickness == 0.0:
+            raise SettingsError(
+                f"residual_fade is '{settings.residual_fade}' without residual_end, and the "
+                "thickness is 0 or relative to depth; expected a residual_end in scene units"
+            )
+    if settings.listing and not settings.plain_edge:
+        raise SettingsError(
+            "listing has an edge fade of its own; expected edge_shape, edge_range, edge_unit and "
+            "edge_combine as they are by default"
+        )
+
+
+def _range(settings: Settings, name: str) -> None:
+    """Two finite numbers, the first below the second, as a tuple of floats."""
+    value = getattr(settings, name)
+    try:
+        start, end = (float(v) for v in value)
+    except (TypeError, ValueError):
+        raise SettingsError(f"{name} is {value!r}; expected two numbers, start and end") from None
+    if not (np.isfinite(start) and np.isfinite(end) and start < end):
+        raise SettingsError(f"{name} is {start:g},{end:g}; expected a finite start below its end")
+    object.__setattr__(settings, name, (start, end))
 
 
 def _whole(settings: Settings, name: str, low: int, high: int) -> None:

@@ -24,6 +24,7 @@ LAYERS = [
     ["texture"],
     ["scene"],
     ["settings"],
+    ["presets"],
     ["buffers"],
     ["scenes"],
     ["raster"],
@@ -42,7 +43,7 @@ LAYERS = [
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 CORE = {"errors", "typed", "_jit", "vecmath", "transforms", "camera", "texture", "scene"}
-CORE |= {"settings"}
+CORE |= {"settings", "presets"}
 CORE |= {"buffers", "scenes", "raster", "shading", "depth", "ssr", "analytic", "maths", "pipeline"}
 OUTSIDE_CORE = {"imageio", "trimesh", "typer", "rich", "OpenEXR", "PIL", "matplotlib"}
 

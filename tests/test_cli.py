@@ -124,11 +124,13 @@ def test_every_setting_has_an_option_of_its_type():
     hints = get_type_hints(Settings)
     for _, name, metavar, _ in SETTING_OPTIONS:
         parts = [part for part in get_args(hints[name]) if part is not type(None)]
+        parts = [] if get_origin(hints[name]) is tuple else parts
         if get_origin(hints[name]) is Literal:
             assert metavar == "|".join(parts), name
         else:
             kind = parts[0] if parts else hints[name]
-            assert metavar == {int: "N", float: "X", bool: None}[kind], name
+            pair = tuple[float, float]
+            assert metavar == {int: "N", float: "X", bool: None, pair: "A,B"}[kind], name
 
 
 def subprocess_of(code: str, *arguments: str, **options):
@@ -243,7 +245,11 @@ def test_every_setting_can_be_given(folder, rendered):
         "--back-any-object --surface plane --facing-test --interval cell --refine none "
         "--self-rejection none --no-edge-fade "
         "--edge-power 2 --distance-fade linear --fresnel --fallback-color 0.1,0.2,0.3 "
-        "--max-roughness 0.75 --snap gpu_vertices --buffer-dtype float64 --no-previews"
+        "--max-roughness 0.75 --snap gpu_vertices --buffer-dtype float64 --no-previews "
+        "--edge-shape smoothstep --edge-range 0.1,0.9 --edge-unit mean --edge-combine sum "
+        "--distance-start 0.25 --steps-fade power --steps-fade-out 2 --steps-fade-in 0.15 "
+        "--facing-fade linear --facing-measure axis --facing-range -0.5,0.5 "
+        "--residual-fade smoothstep --residual-end 0.125 --residual-power 2"
     )
     assert run_line(line) == 0
     assert rendered[0][2] == Settings(
@@ -254,6 +260,10 @@ def test_every_setting_can_be_given(folder, rendered):
         edge_fade=False, edge_power=2.0, distance_fade="linear", fresnel=True,
         fallback="constant", fallback_color=(0.1, 0.2, 0.3), max_roughness=0.75,
         snap="gpu_vertices", buffer_dtype="float64",
+        edge_shape="smoothstep", edge_range=(0.1, 0.9), edge_unit="mean", edge_combine="sum",
+        distance_start=0.25, steps_fade="power", steps_fade_out=2.0, steps_fade_in=0.15,
+        facing_fade="linear", facing_measure="axis", facing_range=(-0.5, 0.5),
+        residual_fade="smoothstep", residual_end=0.125, residual_power=2.0,
     )  # fmt: skip
     line = (
         "render triangle.obj -o two --size 5x3 --tracer march --step 0.125 --growth constant "
@@ -404,6 +414,9 @@ BAD = {
     "render triangle.obj -o out --thickness -1": "thickness is -1",
     "render triangle.obj -o out --thickness nan": "thickness is nan",
     "render triangle.obj -o out --bias inf": "bias is inf",
+    "render triangle.obj -o out --edge-range 0.1": "edge_range is '0.1'",
+    "render triangle.obj -o out --edge-range 0.9,0.1": "edge_range is 0.9,0.1",
+    "render triangle.obj -o out --steps-fade linear": "without max_steps",
     "render triangle.obj -o out --fallback-color red": "fallback color is 'red'",
     "render triangle.obj -o out --fallback-color 1,2": "fallback color is '1,2'",
     "render triangle.obj -o out --fallback-color 1,2,-3": "fallback_color",

@@ -23,6 +23,7 @@ from .. import __version__
 from ..errors import SsrRefError, SsrRefWarning
 from .info import info
 from .output import Output
+from .presets import presets
 from .render import render
 from .scenes import scenes
 from .vectors import vectors
@@ -38,6 +39,7 @@ app = typer.Typer(
 )
 app.command()(render)
 app.command()(info)
+app.command()(presets)
 app.command()(scenes)
 app.command()(vectors)
 

@@ -7,7 +7,7 @@ on the command line. An option of `Settings` is one row of a table here.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, replace
 from functools import wraps
 from pathlib import Path
@@ -22,7 +22,7 @@ from typing import (
 import typer
 
 from ..errors import CameraError, SceneError, SettingsError
-from .parsing import parse_camera, parse_color, parse_scene, parse_size, read_json
+from .parsing import parse_camera, parse_color, parse_pair, parse_scene, parse_size, read_json
 
 if TYPE_CHECKING:
     from ..analytic.scene import AnalyticScene
@@ -55,6 +55,36 @@ class Options:
             )
             for field in fields(cast(Any, cls))
         ]
+
+    def given_values(self) -> dict[str, Any]:
+        """The options that are not at their defaults."""
+        values = {
+            field.name: (getattr(self, field.name), field.default)
+            for field in fields(cast(Any, self))
+        }
+        return {name: value for name, (value, default) in values.items() if value != default}
+
+
+def as_options(values: Mapping[str, Any]) -> list[str]:
+    """Values by name as words of a command line."""
+    words: list[str] = []
+    for name, value in values.items():
+        option = _OPTION_NAMES.get(name, "--" + name.replace("_", "-"))
+        if isinstance(value, bool):
+            words.append(option if value else option.replace("--", "--no-", 1))
+        else:
+            words += [option, _word(value)]
+    return words
+
+
+def _word(value: Any) -> str:
+    """A value as an option reads it back exactly."""
+    if isinstance(value, tuple):
+        return ",".join(_word(part) for part in value)
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+_OPTION_NAMES = {"gltf_scene": "--scene"}
 
 
 def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -239,7 +269,21 @@ SETTING_OPTIONS: tuple[tuple[str, str, str | None, str], ...] = (
     (_TRACE, "facing_test", None, "Refuse faces that the ray meets from behind."),
     (_RESOLVE, "edge_fade", None, "Fade towards the image's border."),
     (_RESOLVE, "edge_power", "X", "Exponent of that fade."),
-    (_RESOLVE, "distance_fade", "none|published|linear", "Fade with the ray's length."),
+    (_RESOLVE, "edge_shape", "power|smoothstep", "How it falls; docs/fades.md has all formulas."),
+    (_RESOLVE, "edge_range", "A,B", "Where it falls: 0 the middle, 1 the border."),
+    (_RESOLVE, "edge_unit", "axis|height|mean", "What distances to the border are shares of."),
+    (_RESOLVE, "edge_combine", "product|sum|max|area", "How both axes are put together."),
+    (_RESOLVE, "distance_fade", "none|published|linear|squared", "Fade with the ray's length."),
+    (_RESOLVE, "distance_start", "X", "Share of max_distance where that begins."),
+    (_RESOLVE, "steps_fade", "none|linear|power", "Fade with the share of max_steps."),
+    (_RESOLVE, "steps_fade_out", "X", "Exponent of what is left of it."),
+    (_RESOLVE, "steps_fade_in", "X", "Exponent of what is taken."),
+    (_RESOLVE, "facing_fade", "none|linear|smoothstep", "Fade of rays that come back to the eye."),
+    (_RESOLVE, "facing_measure", "ray|axis", "How far they do: -I.R, or the ray's own z."),
+    (_RESOLVE, "facing_range", "A,B", "Where that fade begins and ends, -1 to 1."),
+    (_RESOLVE, "residual_fade", "none|linear|smoothstep", "Fade of hits behind the surface."),
+    (_RESOLVE, "residual_end", "X", "Where it is 0; default the thickness."),
+    (_RESOLVE, "residual_power", "X", "Its exponent."),
     (_RESOLVE, "fresnel", None, "Schlick's Fresnel term."),
     (_RESOLVE, "max_roughness", "X", "Rougher pixels do not reflect."),
     (_RESOLVE, "snap", "float64|gpu_vertices", "Vertex positions on screen."),
@@ -247,14 +291,18 @@ SETTING_OPTIONS: tuple[tuple[str, str, str | None, str], ...] = (
 )
 """Panel, name, metavar and help of every setting with an option of its own, as in `--help`.
 
-The metavar tells the type: N a whole number, X a number, a|b words, None on or off. `Settings` is
-not asked, since it needs NumPy and help must be quick; a test compares the two.
+The metavar tells the type: N a whole number, X a number, A,B two, a|b words, None on or off.
+`Settings` is not asked, since it needs NumPy and help must be quick; a test compares the two.
 """
 
 _OTHER_OPTIONS = {
     "settings": Annotated[
         Path | None,
         _option(_TRACE, "Settings, as in a bundle; options win over it.", "FILE.json"),
+    ],
+    "preset": Annotated[
+        str | None,
+        _option(_TRACE, "Defaults of an engine (`presets`); what else is given wins.", "NAME"),
     ],
     "method": Annotated[
         str | None,
@@ -279,6 +327,9 @@ class TraceOptions(Options):
     def __init__(self, **given: Any) -> None:
         self._given = {name: value for name, value in given.items() if value is not None}
 
+    def given_values(self) -> dict[str, Any]:
+        return dict(self._given)
+
     @classmethod
     def parameters(cls) -> list[inspect.Parameter]:
         """One option for each row of `SETTING_OPTIONS`."""
@@ -293,31 +344,60 @@ class TraceOptions(Options):
             for name, annotation in annotations.items()
         ]
 
-    def methods(self) -> dict[str, Settings]:
-        """The settings of every method asked for, by name; without `--method` one, named ""."""
-        from ..settings import Settings, method_settings
+    def base(self) -> Settings:
+        """The settings without regard to `--method`. Raises SettingsError."""
+        base, given = self._parts()
+        return replace(base, **given)
+
+    def _parts(self) -> tuple[Settings, dict[str, Any]]:
+        """The settings file's contents, and what options put over it."""
+        from ..presets import preset_settings
+        from ..settings import Settings
 
         given = dict(self._given)
-        path, names, more = (given.pop(name, None) for name in ("settings", "method", "more"))
+        path, preset = given.pop("settings", None), given.pop("preset", None)
+        for name in ("method", "more"):
+            given.pop(name, None)
         base = Settings() if path is None else read_json(path, Settings.from_json, SettingsError)
+        if preset is not None:
+            if path is not None:
+                raise SettingsError("both --preset and --settings are given; expected one of them")
+            base = preset_settings(preset)
         if "size" in given:
             given["size"] = parse_size(given["size"])
+        for _, name, metavar, _ in SETTING_OPTIONS:
+            if metavar == "A,B" and name in given:
+                given[name] = parse_pair(given[name], name)
         if "fallback_color" in given:
             given |= {
                 "fallback": "constant",
                 "fallback_color": parse_color(given["fallback_color"]),
             }
-        if names is None:
-            further = {} if more is None else read_json(more, _settings_by_name, SettingsError)
-            return {"": replace(base, **given), **further}
-        for name, other in (("tracer", given.get("tracer")), ("more", more)):
-            if other is not None:
+        return base, given
+
+    def method_names(self) -> list[str]:
+        """The names after `--method`, each once; none without it."""
+        wanted = [name.strip() for name in self._given.get("method", "").split(",")]
+        if "method" not in self._given:
+            return []
+        for name in ("tracer", "more"):
+            if name in self._given:
                 raise SettingsError(f"both --method and --{name} are given; expected one of them")
-        wanted = [name.strip() for name in names.split(",")]
         for i, name in enumerate(wanted):
             if name in wanted[:i]:
                 raise SettingsError(f"method '{name}' is named twice; expected each once")
-        return {name: method_settings(name, base, **given) for name in wanted}
+        return wanted
+
+    def methods(self) -> dict[str, Settings]:
+        """The settings of every method asked for, by name; without `--method` one, named ""."""
+        from ..settings import method_settings
+
+        names, more = self.method_names(), self._given.get("more")
+        if names:
+            base, given = self._parts()
+            return {name: method_settings(name, base, **given) for name in names}
+        further = {} if more is None else read_json(more, _settings_by_name, SettingsError)
+        return {"": self.base(), **further}
 
 
 def _settings_by_name(data: Any) -> dict[str, Settings]:

@@ -40,6 +40,15 @@ def parse_color(text: str) -> tuple[float, float, float]:
     return r, g, b
 
 
+def parse_pair(text: str, name: str) -> tuple[float, float]:
+    """(a, b) of "0.1,0.9"; the range is checked by Settings. Raises SettingsError."""
+    try:
+        a, b = (float(part) for part in text.split(","))
+    except ValueError:
+        raise SettingsError(f"{name} is '{text}'; expected two numbers such as 0.1,0.9") from None
+    return a, b
+
+
 def parse_camera(data: Any) -> Camera | View:
     """A camera from its matrices, or a view, which has an eye and a target instead."""
     from ..camera import Camera, View

@@ -352,6 +352,18 @@ def _distance_fade(inputs: _Inputs) -> Picture:
     return _share(inputs["distance_fade"], inputs.hit, "distance fade", "hits")
 
 
+def _steps_fade(inputs: _Inputs) -> Picture:
+    return _share(inputs["steps_fade"], inputs.hit, "steps fade", "hits")
+
+
+def _facing_fade(inputs: _Inputs) -> Picture:
+    return _share(inputs["facing_fade"], inputs.hit, "facing fade", "hits")
+
+
+def _residual_fade(inputs: _Inputs) -> Picture:
+    return _share(inputs["residual_fade"], inputs.hit, "residual fade", "hits")
+
+
 def _roughness(inputs: _Inputs) -> Picture:
     return _share(inputs["roughness"], ~inputs.background, "roughness", "drawn pixels")
 
@@ -602,6 +614,9 @@ _PICTURES: tuple[tuple[str, tuple[str, ...], Callable[[_Inputs], Picture]], ...]
     ("confidence", ("confidence", "status"), _confidence),
     ("edge_fade", ("edge_fade", "status"), _edge_fade),
     ("distance_fade", ("distance_fade", "status"), _distance_fade),
+    ("steps_fade", ("steps_fade", "status"), _steps_fade),
+    ("facing_fade", ("facing_fade", "status"), _facing_fade),
+    ("residual_fade", ("residual_fade", "status"), _residual_fade),
 )
 """Every picture: its name, the buffers it needs, and what draws it."""
 _NEEDED = {name: needed for name, needed, _ in _PICTURES}
