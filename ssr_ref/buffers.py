@@ -118,6 +118,7 @@ class HitBuffer:
     steps, fetches (H, W) uint32: samples tested; depth and back-depth reads.
     fade_px, fade_length: what the fades of a published listing are taken at instead of hit_px and
     length; fade_px may lie outside the image. Only with `Settings.listing`.
+    sample_count (H, W) uint32: how often all rays tested each pixel; only if asked for.
     """
 
     status: U8Array
@@ -131,6 +132,7 @@ class HitBuffer:
     fetches: U32Array
     fade_px: F64Array | None = None
     fade_length: F64Array | None = None
+    sample_count: U32Array | None = None
 
     def arrays(self) -> dict[str, AnyArray]:
         """The buffers that exist, by name."""

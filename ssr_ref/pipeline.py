@@ -158,6 +158,11 @@ def trace_method(
     """Trace and resolve; the stages' names get the suffix."""
     with stages("trace" + suffix):
         hits = trace(view, gbuffer, settings, stages.within("trace" + suffix))
+    if settings.sample_counts:
+        from .ssr.explain import sample_counts
+
+        with stages("counts" + suffix):
+            hits = replace(hits, sample_count=sample_counts(view, gbuffer, settings))
     with stages("resolve" + suffix):
         resolved = resolve(view, gbuffer, hits, settings)
     return Traced(settings, hits, resolved)

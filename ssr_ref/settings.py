@@ -100,6 +100,7 @@ class Settings:
     max_roughness : rougher pixels do not reflect.
     snap : "float64" window coordinates, or "gpu_vertices": float32 as a GPU computes them.
     buffer_dtype : of the G-buffer, "float32" (rounded once) or "float64".
+    sample_counts : also count how often all rays test each pixel: a second, slower pass.
     """
 
     size: Size = (960, 540)
@@ -145,6 +146,7 @@ class Settings:
     max_roughness: float = 0.5
     snap: SnapName = "float64"
     buffer_dtype: BufferDtype = "float32"
+    sample_counts: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", check_size(self.size))
@@ -286,6 +288,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "facing_test": (True, False),
     "edge_fade": (True, False),
     "fresnel": (True, False),
+    "sample_counts": (True, False),
 }
 
 
@@ -314,6 +317,10 @@ def _check_tracer(settings: Settings) -> None:
         )
     if settings.listing:
         _check_listing(settings)
+        if settings.sample_counts:
+            raise SettingsError(
+                "sample_counts with listing; expected one of them: a published listing has no log"
+            )
     if tracer != "march":
         return
     if settings.surface != "constant":

@@ -249,7 +249,7 @@ def test_every_setting_can_be_given(folder, rendered):
         "--edge-shape smoothstep --edge-range 0.1,0.9 --edge-unit mean --edge-combine sum "
         "--distance-start 0.25 --steps-fade power --steps-fade-out 2 --steps-fade-in 0.15 "
         "--facing-fade linear --facing-measure axis --facing-range -0.5,0.5 "
-        "--residual-fade smoothstep --residual-end 0.125 --residual-power 2"
+        "--residual-fade smoothstep --residual-end 0.125 --residual-power 2 --sample-counts"
     )
     assert run_line(line) == 0
     assert rendered[0][2] == Settings(
@@ -263,7 +263,7 @@ def test_every_setting_can_be_given(folder, rendered):
         edge_shape="smoothstep", edge_range=(0.1, 0.9), edge_unit="mean", edge_combine="sum",
         distance_start=0.25, steps_fade="power", steps_fade_out=2.0, steps_fade_in=0.15,
         facing_fade="linear", facing_measure="axis", facing_range=(-0.5, 0.5),
-        residual_fade="smoothstep", residual_end=0.125, residual_power=2.0,
+        residual_fade="smoothstep", residual_end=0.125, residual_power=2.0, sample_counts=True,
     )  # fmt: skip
     line = (
         "render triangle.obj -o two --size 5x3 --tracer march --step 0.125 --growth constant "

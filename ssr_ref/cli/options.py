@@ -288,6 +288,7 @@ SETTING_OPTIONS: tuple[tuple[str, str, str | None, str], ...] = (
     (_RESOLVE, "max_roughness", "X", "Rougher pixels do not reflect."),
     (_RESOLVE, "snap", "float64|gpu_vertices", "Vertex positions on screen."),
     (_RESOLVE, "buffer_dtype", "float32|float64", "Of the G-buffer."),
+    (_RESOLVE, "sample_counts", None, "Count how often all rays test each pixel."),
 )
 """Panel, name, metavar and help of every setting with an option of its own, as in `--help`.
 

@@ -305,6 +305,11 @@ def _fetches(inputs: _Inputs) -> Picture:
     return _amount(inputs["fetches"], ~inputs.walked, "depth and back-depth reads", "no ray walked")
 
 
+def _sample_count(inputs: _Inputs) -> Picture:
+    counts = inputs["sample_count"]
+    return _amount(counts, counts == 0, "tests of each pixel by all rays", "never tested")
+
+
 def _amount(
     amount: AnyArray,
     blank: BoolArray,
@@ -611,6 +616,7 @@ _PICTURES: tuple[tuple[str, tuple[str, ...], Callable[[_Inputs], Picture]], ...]
     ("length", ("length", "status"), _length),
     ("steps", ("steps", "status"), _steps),
     ("fetches", ("fetches", "status"), _fetches),
+    ("sample_count", ("sample_count",), _sample_count),
     ("confidence", ("confidence", "status"), _confidence),
     ("edge_fade", ("edge_fade", "status"), _edge_fade),
     ("distance_fade", ("distance_fade", "status"), _distance_fade),

@@ -132,6 +132,7 @@ def bisect(
     a: float,
     b: float,
     reads: int,
+    log: Log | None,
 ) -> tuple[Hit, int]:
     """Halve [a, b] down to half a pixel, keeping the half whose end is behind its front.
 
@@ -150,7 +151,11 @@ def bisect(
         x, y = np.int64(position_x(ray, middle)), np.int64(position_y(ray, middle))
         low = slabs[y, x, 0]
         fetches += 1 if low == np.inf else reads
-        if depth_at(ray, middle) >= low:
+        z = depth_at(ray, middle)
+        if log is not None:
+            what = EMPTY if low == np.inf else (IN_FRONT if z < low else PASSED)
+            write(log, middle, x, y, middle, middle, z, z, low, slabs[y, x, 1], what)
+        if z >= low:
             b = middle
         else:
             a = middle
@@ -159,13 +164,18 @@ def bisect(
     x, y = np.int64(position_x(ray, b)), np.int64(position_y(ray, b))
     low = slabs[y, x, 0]
     fetches += 1 if low == np.inf else reads
-    if (
-        low == np.inf
-        or compare_with_slab(depth_at(ray, a), depth_at(ray, b), low, slabs[y, x, 1]) != IN_SLAB
-    ):
-        return no_hit(), fetches
-    z_front = np.float64(depth[y, x])
-    if refusal(view, rules, ray, x, y, z_front, load3(normal, y, x)) != 0:
+    z_a, z_b = depth_at(ray, a), depth_at(ray, b)
+    verdict = MISS if low == np.inf else compare_with_slab(z_a, z_b, low, slabs[y, x, 1])
+    why_not = 0
+    if verdict == IN_SLAB:
+        z_front = np.float64(depth[y, x])
+        why_not = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
+    if log is not None:
+        what = EMPTY if low == np.inf else (IN_FRONT if verdict == MISS else PASSED)
+        if verdict == IN_SLAB:
+            what = HIT if why_not == 0 else refused(why_not)
+        write(log, b, x, y, a, b, z_a, z_b, low, slabs[y, x, 1], what)
+    if verdict != IN_SLAB or why_not != 0:
         return no_hit(), fetches
     slab = load_slab(slabs, depth, back, x, y)
     return locate_hit(rules, ray, slab, x, y, a, b, False), fetches
@@ -270,9 +280,13 @@ def march_dda(
             slab = load_slab(slabs, depth, back, x, y)
             hit = locate_hit(rules, ray, slab, x, y, near, far, interval == CELL)
             if refine == BISECT:
+                if log is not None:
+                    log.state[1] = 1
                 better, reads_more = bisect(
-                    view, rules, slabs, depth, back, normal, ray, near, far, reads
+                    view, rules, slabs, depth, back, normal, ray, near, far, reads, log
                 )
+                if log is not None:
+                    log.state[1] = 0
                 fetches += reads_more
                 if better.found:
                     hit = better

@@ -31,6 +31,8 @@ from .hit import (
 )
 from .march_cells import CellWalk
 from .ray import Ray
+from .record import EMPTY, HIT, PASSED, Log, refused, write
+from .record import IN_FRONT as BEFORE
 
 LINEAR, CONSTANT = 0, 1
 """How the increments grow."""
@@ -72,7 +74,7 @@ class Probe(NamedTuple):
     what: int
     gap: float  # depth − (front + bias) unless NOTHING
     fetches: int
-    refused: int  # the flag, if only a rule beyond the slab says that it is no hit
+    flags: int  # what was met that is no hit
 
 
 @kernel
@@ -163,25 +165,42 @@ def probe(
     depth: FloatArray,
     normal: FloatArray,
     ray: Ray,
+    before: float,
     t: float,
     reads: int,
+    log: Log | None,
 ) -> Probe:
-    """The point at t by the hit rule. INSIDE: a hit; the own pixel and what is unseen: NOTHING."""
+    """The point at t by the hit rule. INSIDE: a hit; the own pixel and what is unseen: NOTHING.
+
+    before: the distance that the log shows as the start of the interval.
+    """
     spot = spot_at(view, ray, t)
     if not seen(view, spot) or in_own_pixel(ray, spot):
         return Probe(NOTHING, 0.0, 0, 0)
     x, y = np.int64(spot.px), np.int64(spot.py)
-    low = slabs[y, x, 0]
-    if low == np.inf:
-        return Probe(NOTHING, 0.0, 1, 0)
+    low, z_back = slabs[y, x, 0], slabs[y, x, 1]
     gap = spot.depth - low
-    if spot.depth < low:
-        return Probe(IN_FRONT, gap, reads, 0)
-    if spot.depth > slabs[y, x, 1]:
-        return Probe(NOTHING, gap, reads, 0)
-    z_front = np.float64(depth[y, x])
-    why_not = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
-    return Probe(INSIDE if why_not == 0 else NOTHING, gap, reads, why_not)
+    if low == np.inf:
+        found = Probe(NOTHING, 0.0, 1, OVER_EMPTY)
+    elif spot.depth < low:
+        found = Probe(IN_FRONT, gap, reads, 0)
+    elif spot.depth > z_back:
+        found = Probe(NOTHING, gap, reads, PASSED_BEHIND)
+    else:
+        z_front = np.float64(depth[y, x])
+        why_not = refusal(view, rules, ray, x, y, z_front, load3(normal, y, x))
+        found = Probe(INSIDE if why_not == 0 else NOTHING, gap, reads, why_not)
+    if log is not None:
+        what = HIT if found.what == INSIDE else BEFORE
+        if found.flags == OVER_EMPTY:
+            what = EMPTY
+        elif found.flags == PASSED_BEHIND:
+            what = PASSED
+        elif found.flags != 0:
+            what = refused(found.flags)
+        z = ray.origin_depth - before * ray.direction_vs.z
+        write(log, t, x, y, before, t, z, spot.depth, low, z_back, what)
+    return found
 
 
 @kernel
@@ -197,6 +216,7 @@ def refined(
     refine: int,
     halvings: int,
     reads: int,
+    log: Log | None,
 ) -> tuple[float, int]:
     """The distance of the hit between the last two samples, and the reads it took.
 
@@ -205,10 +225,11 @@ def refined(
     is left out unless the bracket begins in front of a surface, and undone if it is not inside.
     """
     fetches = 0
-    gap = probe(view, rules, slabs, depth, normal, ray, outside, reads)  # read by the walk
+    # What the walk has read already is no row of the log.
+    gap = probe(view, rules, slabs, depth, normal, ray, outside, outside, reads, None)
     for _ in range(halvings):
         middle = 0.5 * (outside + inside)
-        at = probe(view, rules, slabs, depth, normal, ray, middle, reads)
+        at = probe(view, rules, slabs, depth, normal, ray, outside, middle, reads, log)
         fetches += at.fetches
         if at.what == INSIDE:
             inside = middle
@@ -216,10 +237,10 @@ def refined(
             outside = middle
             gap = at
     if refine == SECANT and gap.what == IN_FRONT:
-        behind = probe(view, rules, slabs, depth, normal, ray, inside, reads).gap
+        behind = probe(view, rules, slabs, depth, normal, ray, inside, inside, reads, None).gap
         t = outside + (inside - outside) * (-gap.gap / (behind - gap.gap))
         t = min(max(t, outside), inside)
-        at = probe(view, rules, slabs, depth, normal, ray, t, reads)
+        at = probe(view, rules, slabs, depth, normal, ray, outside, t, reads, log)
         fetches += at.fetches
         if at.what == INSIDE:
             inside = t
@@ -258,6 +279,7 @@ def march_view(
     refine: int,
     halvings: int,
     max_steps: int,
+    log: Log | None,
 ) -> CellWalk:
     """Walk a ray by samples at `distance_of` 0, 1, …; those in the own pixel are not tested.
 
@@ -271,11 +293,12 @@ def march_view(
     flags = 0
     fetches = 0
     while True:
-        scan = skip_misses(view, slabs, ray, march, i, first + max_steps)
-        fetches += (scan.i - i) * reads - scan.empty * (reads - 1)
-        flags |= OVER_EMPTY if scan.empty > 0 else 0
-        flags |= PASSED_BEHIND if scan.behind > 0 else 0
-        i = scan.i
+        if log is None:
+            scan = skip_misses(view, slabs, ray, march, i, first + max_steps)
+            fetches += (scan.i - i) * reads - scan.empty * (reads - 1)
+            flags |= OVER_EMPTY if scan.empty > 0 else 0
+            flags |= PASSED_BEHIND if scan.behind > 0 else 0
+            i = scan.i
 
         t = distance_of(march, i)
         spot = spot_at(view, ray, t)
@@ -285,17 +308,21 @@ def march_view(
             return CellWalk(no_hit(), flags, i - first, fetches, True, False)
 
         # A candidate: only the tangent plane can still refuse it.
-        at = probe(view, rules, slabs, depth, normal, ray, t, reads)
+        before = distance_of(march, i - 1) if i > 0 else 0.0
+        at = probe(view, rules, slabs, depth, normal, ray, before, t, reads, log)
         fetches += at.fetches
         i += 1
         if at.what == INSIDE:
             if refine != NO_REFINE:
-                before = distance_of(march, i - 2) if i > 1 else 0.0
+                if log is not None:
+                    log.state[1] = 1
                 t, more = refined(
-                    view, rules, slabs, depth, normal, ray, before, t, refine, halvings, reads
+                    view, rules, slabs, depth, normal, ray, before, t, refine, halvings, reads, log
                 )
+                if log is not None:
+                    log.state[1] = 0
                 fetches += more
             hit = hit_at(view, rules, slabs, depth, back, ray, t)
             return CellWalk(hit, flags, i - first, fetches, False, False)
-        flags |= at.refused
+        flags |= at.flags
     return CellWalk(no_hit(), flags, i - first, fetches, False, False)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .._jit import kernel
 from ..buffers import Flag
-from ..typed import F64Array, I64Array
+from ..typed import F64Array, I64Array, U32Array
 
 
 class Verdict(IntEnum):
@@ -33,20 +33,31 @@ SELF_FLAG = int(Flag.SELF_REJECTED)
 EMPTY, IN_FRONT, PASSED, SELF, BACK_FACE, PROPOSED, HIT, STOPPED = (int(v) for v in Verdict)
 
 COLUMNS = ("level", "s", "x", "y", "start", "end", "depth_start", "depth_end", "front", "back")
-"""Of a row, then the verdict. level: 0 a sample, 1 a cell of a re-walk; x, y: the pixel read; s and
-the interval's start and end in pixels of the major axis; depths and slab in scene units."""
+"""Of a row, then the verdict. level: 0 a sample, 1 a read of refinement; x, y: the pixel read; s
+and the interval's start and end in pixels of the major axis (3-D march: distance along the ray);
+depths and slab in scene units."""
 
 
 class Log(NamedTuple):
-    """Rows of a walk; rows that do not fit are counted and not kept."""
+    """Rows of walks, one for each test of a pixel; rows that do not fit are counted and not kept.
+
+    counts: how often each pixel was tested; without pixels nothing is counted.
+    """
 
     rows: F64Array  # (n, 11): COLUMNS and the verdict
     state: I64Array  # (2,): rows written, level of the next one
+    counts: U32Array  # (H, W) or (0, 0)
 
 
 def new_log(room: int) -> Log:
-    """An empty log."""
-    return Log(np.zeros((room, len(COLUMNS) + 1)), np.zeros(2, np.int64))
+    """An empty log that keeps so many rows."""
+    rows = np.zeros((room, len(COLUMNS) + 1))
+    return Log(rows, np.zeros(2, np.int64), np.zeros((0, 0), np.uint32))
+
+
+def new_counts(shape: tuple[int, int]) -> Log:
+    """A log that only counts, for an image of (H, W) pixels."""
+    return new_log(0)._replace(counts=np.zeros(shape, np.uint32))
 
 
 @kernel
@@ -63,9 +74,11 @@ def write(
     back: float,
     verdict: int,
 ) -> None:
-    """Append a row."""
+    """Append a row, and count it."""
     n = log.state[0]
     log.state[0] = n + 1
+    if log.counts.shape[0] > 0:
+        log.counts[y, x] += np.uint32(1)
     if n < log.rows.shape[0]:
         log.rows[n, 0] = log.state[1]
         log.rows[n, 1] = s

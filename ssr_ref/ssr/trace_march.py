@@ -57,6 +57,7 @@ def trace_march_rows(
                 refine,
                 halvings,
                 max_steps,
+                None,
             )
             close_pixel(out, x, y, ray, walk)
             store_length(out, x, y, walk)
