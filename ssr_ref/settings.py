@@ -21,7 +21,8 @@ SurfaceName = Literal["constant", "plane"]
 IntervalName = Literal["column", "cell", "point", "published"]
 RefineName = Literal["auto", "rewalk", "bisect", "secant", "none"]
 GrowthName = Literal["linear", "constant"]
-SelfRejection = Literal["plane", "none"]
+SelfRejection = Literal["plane", "slope_bias", "none"]
+GeoNormals = Literal["buffer", "fitted"]
 EdgeShape = Literal["power", "smoothstep"]
 EdgeCombine = Literal["product", "sum", "max", "area"]
 EdgeUnit = Literal["axis", "height", "mean"]
@@ -75,7 +76,10 @@ class Settings:
     refine_steps : halvings of the march's refinement, 0 to 64.
     listing : the march or the DDA as published, with its slips (docs/errata_tracers.md); needs
         max_steps.
-    self_rejection : "plane" refuses hits under the origin's tangent plane; "none".
+    self_rejection : "plane" refuses hits under the origin's tangent plane; "slope_bias" instead
+        pushes each front back by half the depth range that the surface spans in its pixel; "none".
+    geo_normals : geometric normals are the G-buffer's ("buffer", fitted if it has none) or fitted
+        to neighbouring depths ("fitted").
     facing_test : refuse a candidate whose geometric normal the ray does not go against.
     edge_fade : whether confidence falls towards the image's border; edge_power its exponent, above
         0; None: 2 for the march, else 3. Formulas of all fades: docs/fades.md.
@@ -122,6 +126,7 @@ class Settings:
     refine_steps: int = 8
     listing: bool = False
     self_rejection: SelfRejection = "plane"
+    geo_normals: GeoNormals = "buffer"
     facing_test: bool = False
     edge_fade: bool = True
     edge_power: float | None = None
@@ -271,6 +276,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "refine": get_args(RefineName),
     "growth": get_args(GrowthName),
     "self_rejection": get_args(SelfRejection),
+    "geo_normals": get_args(GeoNormals),
     "edge_shape": get_args(EdgeShape),
     "edge_unit": get_args(EdgeUnit),
     "edge_combine": get_args(EdgeCombine),
@@ -321,6 +327,11 @@ def _check_tracer(settings: Settings) -> None:
             raise SettingsError(
                 "sample_counts with listing; expected one of them: a published listing has no log"
             )
+    if settings.surface == "plane" and settings.self_rejection == "slope_bias":
+        raise SettingsError(
+            "self_rejection is 'slope_bias' with surface 'plane'; expected 'plane' or 'none': a "
+            "plane has its slope and needs no bias for it"
+        )
     if tracer != "march":
         return
     if settings.surface != "constant":

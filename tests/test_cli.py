@@ -243,7 +243,7 @@ def test_every_setting_can_be_given(folder, rendered):
         "render triangle.obj -o out --size 5x3 --tracer cells --stride 3 --jitter --seed 7 "
         "--max-steps 99 --max-distance 2.5 --bias 0.25 --thickness 0.5 --thickness-from constant "
         "--back-any-object --surface plane --facing-test --interval cell --refine none "
-        "--self-rejection none --no-edge-fade "
+        "--self-rejection none --geo-normals fitted --no-edge-fade "
         "--edge-power 2 --distance-fade linear --fresnel --fallback-color 0.1,0.2,0.3 "
         "--max-roughness 0.75 --snap gpu_vertices --buffer-dtype float64 --no-previews "
         "--edge-shape smoothstep --edge-range 0.1,0.9 --edge-unit mean --edge-combine sum "
@@ -256,7 +256,7 @@ def test_every_setting_can_be_given(folder, rendered):
         size=(5, 3), tracer="cells", stride=3, jitter=True, seed=7, max_steps=99,
         max_distance=2.5, bias=0.25, thickness=0.5, thickness_from="constant",
         back_any_object=True, surface="plane", facing_test=True, interval="cell",
-        refine="none", self_rejection="none",
+        refine="none", self_rejection="none", geo_normals="fitted",
         edge_fade=False, edge_power=2.0, distance_fade="linear", fresnel=True,
         fallback="constant", fallback_color=(0.1, 0.2, 0.3), max_roughness=0.75,
         snap="gpu_vertices", buffer_dtype="float64",

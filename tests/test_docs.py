@@ -144,7 +144,7 @@ def trace_by_listing(space: Space, frame: Frame) -> list[list[Any]]:
     )
     values = listing_settings(frame)
     if chosen.surface == "plane":
-        planes = space["prepare_planes"](view, buffers, values.thickness)
+        planes = space["prepare_planes"](view, values, buffers)
         return [
             [space["trace_planes"](view, buffers, planes, values, x, y) for x in range(view.width)]
             for y in range(view.height)
@@ -174,6 +174,7 @@ def listing_settings(frame: Frame) -> SimpleNamespace:
         bias=chosen.bias,
         rounding=2.0**-53 if frame.gbuffer.depth.dtype == np.float64 else 2.0**-24,
         reject_self=chosen.self_rejection == "plane",
+        slope_bias=chosen.self_rejection == "slope_bias",
         facing_test=chosen.facing_test,
         model=chosen.thickness_from,
         most=chosen.thickness if chosen.thickness_from in FRONT_PLUS_CONSTANT else math.inf,
@@ -200,10 +201,15 @@ TRACES: list[tuple[View | None, dict[str, Any]]] = [
     (None, {"interval": "published", "thickness_from": "relative", "thickness": 0.01}),
     (SHIFTED, {"stride": 5, "refine": "bisect", "jitter": True, "thickness_from": "material"}),
     (ORTHOGRAPHIC, {"stride": 7, "refine": "bisect", "thickness_from": "slope"}),
+    (None, {"self_rejection": "slope_bias", "tracer": "cells", "thickness_from": "slope"}),
+    (ORTHOGRAPHIC, {"self_rejection": "slope_bias", "stride": 3, "refine": "bisect"}),
     (None, {"surface": "plane"}),
     (None, {"surface": "plane", "tracer": "cells", "max_steps": 9}),
     (SHIFTED, {"surface": "plane", "stride": 4, "jitter": True}),
     (INSIDE, {"surface": "plane", "thickness_from": "constant", "max_distance": 0.4}),
+    (None, {"surface": "plane", "thickness_from": "slope", "tracer": "cells"}),
+    (SHIFTED, {"surface": "plane", "thickness_from": "material", "stride": 3}),
+    (ORTHOGRAPHIC, {"surface": "plane", "thickness_from": "relative", "thickness": 0.01}),
     (ORTHOGRAPHIC, {"surface": "plane", "jitter": True, "max_distance": math.inf}),
     (ORTHOGRAPHIC, {"surface": "plane", "tracer": "cells"}),
     (ORTHOGRAPHIC, {"surface": "plane", "stride": 3, "self_rejection": "none"}),
@@ -239,6 +245,7 @@ MARCHES: list[tuple[View | None, dict[str, Any]]] = [
     (SHIFTED, {"growth": "constant", "refine": "secant", "refine_steps": 3, "bias": 0.01}),
     (ORTHOGRAPHIC, {"thickness_from": "constant", "jitter": True, "refine": "none"}),
     (INSIDE, {"max_distance": math.inf, "max_steps": 12, "refine": "secant", "step": 0.02}),
+    (None, {"self_rejection": "slope_bias", "refine": "secant", "jitter": True}),
 ]
 
 

@@ -22,6 +22,8 @@ VARIANTS = [
     {"interval": "cell", "bias": 0.01},
     {"thickness_from": "constant", "thickness": np.inf, "max_distance": np.inf},
     {"self_rejection": "none", "max_steps": 2},
+    {"self_rejection": "slope_bias", "geo_normals": "fitted", "thickness_from": "slope"},
+    {"surface": "plane", "geo_normals": "fitted", "thickness_from": "relative", "stride": 2},
     {"fresnel": True, "distance_fade": "linear", "fallback": "constant",
      "fallback_color": (0.1, 0.2, 0.3)},
     {"buffer_dtype": "float64", "snap": "gpu_vertices", "back_any_object": True},

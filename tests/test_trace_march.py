@@ -556,7 +556,9 @@ def listed(view: ViewParams, g: GBuffer, x: int, y: int, slips: int, **kw: Any) 
          "max_steps": 30, "max_distance": 8.0, "thickness": 0.2, "bias": 0.0} | kw  # fmt: skip
     slabs = np.empty((view.height, view.width, 2))
     back = np.empty((0, 0), np.float32)
-    prepare_slabs(view, g.depth, g.geo_normal_vs, back, 0, o["thickness"], back, o["bias"], slabs)
+    prepare_slabs(
+        view, g.depth, g.geo_normal_vs, back, 0, o["thickness"], back, o["bias"], 0.0, slabs
+    )
     n, m = (Vec3(*map(float, image[y, x])) for image in (g.normal_vs, g.geo_normal_vs))  # type: ignore[index]
     ray = set_up_ray(view, x, y, float(g.depth[y, x]), n, m, np.inf)[1]
     return march_listing(

@@ -41,9 +41,10 @@ class SlabRules(NamedTuple):
 
 
 class Slab(NamedTuple):
-    """An accepted pixel: front and back depth, and OPEN if back is front + thickness."""
+    """An accepted pixel: depths, and OPEN if back is not that of a back face."""
 
     front: float
+    low: float  # where a ray enters: the front, pushed back by a bias
     back: float
     flags: int
 
@@ -128,7 +129,7 @@ def compare_with_slab(z_a: float, z_b: float, low: float, back: float) -> int:
 def load_slab(slabs: F64Array, depth: FloatArray, back: FloatArray, x: int, y: int) -> Slab:
     """The slab of pixel (x, y), which is not empty."""
     is_open = back.shape[0] == 0 or not back[y, x] < np.inf
-    return Slab(np.float64(depth[y, x]), slabs[y, x, 1], OPEN if is_open else 0)
+    return Slab(np.float64(depth[y, x]), slabs[y, x, 0], slabs[y, x, 1], OPEN if is_open else 0)
 
 
 @kernel
@@ -154,7 +155,7 @@ def locate_hit(
     outside by an ulp, and a ray that comes from the right or from below enters exactly on the
     border that belongs to its neighbour: both are moved to the nearest position in the pixel.
     """
-    low = slab.front + rules.bias
+    low = slab.low
     z = depth_at(ray, a)
     s = a
     if z < low or z > slab.back:

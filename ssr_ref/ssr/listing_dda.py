@@ -187,7 +187,7 @@ def march_listing_dda(
                 why_not = refusal(view, rules, ray, x, y, front, load3(normal, y, x))
             flags |= why_not
             if why_not == 0:
-                slab = Slab(front, z_back, OPEN if is_open else 0)
+                slab = Slab(front, low, z_back, OPEN if is_open else 0)
                 hit = locate_hit(rules, ray, slab, x, y, a, b, False)
                 length = length_at(ray, hit.s)
                 if slips & LATE_POINT:

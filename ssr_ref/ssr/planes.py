@@ -21,9 +21,10 @@ from numba import prange
 from .._jit import driver, kernel
 from ..camera import ViewParams, ray_through
 from ..typed import F64Array, FloatArray
-from ..vecmath.vec import Vec3, dot
+from ..vecmath.vec import dot
 from .hit import load3
 from .ray import Ray, position_x, position_y
+from .solid import gradient, solid_end
 
 
 class Plane(NamedTuple):
@@ -34,7 +35,7 @@ class Plane(NamedTuple):
     w: float  # nearness at the centre, −inf if the pixel cannot be hit
     gx: float
     gy: float
-    back: float  # nearness of the back face, or of front + thickness
+    back: float  # nearness of the solid's end
 
 
 @kernel
@@ -58,26 +59,18 @@ def ray_nearness(ray: Ray, s: float) -> float:
     return k if ray.perspective else -k
 
 
-@kernel
-def gradient(view: ViewParams, n: Vec3, depth: float, facing: float) -> tuple[float, float]:
-    """Change of w per pixel to the right and down; n any length, facing = n·d."""
-    if view.perspective:
-        scale = 1.0 / (depth * facing)
-        return n.x * view.inverse_fx * scale, -(n.y * view.inverse_fy * scale)
-    return -(n.x * view.inverse_fx / n.z), n.y * view.inverse_fy / n.z
-
-
 @driver()
 def prepare_planes(
     view: ViewParams,
     depth: FloatArray,
     geo_normal: FloatArray,
     back: FloatArray,
+    model: int,
     thickness: float,
+    thickness_image: FloatArray,
     planes: F64Array,
 ) -> None:
-    """planes (H, W, 4) = w, g_x, g_y and back of every pixel."""
-    has_back = back.shape[0] > 0
+    """planes (H, W, 4) = w, g_x, g_y and back of every pixel; back is that of `solid_end`."""
     for y in prange(view.height):
         for x in range(view.width):
             z = np.float64(depth[y, x])
@@ -90,9 +83,9 @@ def prepare_planes(
             if z > 0.0 and z < np.inf and facing < 0.0:
                 w = nearness_of(view.perspective, z)
                 gx, gy = gradient(view, n, z, facing)
-                z_back = z + thickness
-                if has_back and back[y, x] < np.inf:
-                    z_back = np.float64(back[y, x])
+                z_back = solid_end(
+                    view, model, thickness, thickness_image, back, x, y, n, z, facing
+                )
                 w_back = nearness_of(view.perspective, z_back)
             planes[y, x, 0] = w
             planes[y, x, 1] = gx

@@ -18,6 +18,7 @@ from ..typed import F64Array, FloatArray
 from ..vecmath.noise import jitter
 from ..vecmath.vec import dot
 from . import listing_dda, listing_march, march_view
+from .fit_planes import fit_normals
 from .hit import SlabRules, load3
 from .march_cells import CellWalk, march_cells
 from .march_dda import (
@@ -30,18 +31,18 @@ from .march_dda import (
     REWALK,
     march_dda,
 )
-from .planes import gradient, prepare_planes
+from .planes import prepare_planes
 from .ray import Ray
 from .record import Log
 from .rows import CELLS, DDA, Inputs, Outputs, close_pixel, open_pixel
+from .solid import CONSTANT, IMAGE, MODELS, depth_span, solid_end
 from .trace_march import trace_march_rows
 from .trace_planes import trace_plane_rows
 
 NO_LIMIT = 2**62
 
-CONSTANT, RELATIVE, SLOPE, IMAGE = 0, 1, 2, 3
-"""What a pixel without back face ends with."""
-_MODELS = {"relative": RELATIVE, "slope": SLOPE, "material": IMAGE}
+SLOPE_BIAS = 0.5
+"""Of the range of depth inside a pixel: the surface is that much deeper at its far corner."""
 _INTERVALS = {"column": COLUMN, "cell": CELL, "point": POINT, "published": PUBLISHED}
 _REFINES = {"none": NO_REFINE, "rewalk": REWALK, "bisect": BISECT}
 
@@ -56,16 +57,14 @@ def prepare_slabs(
     thickness: float,
     thickness_image: FloatArray,
     bias: float,
+    slope_bias: float,
     slabs: F64Array,
 ) -> None:
-    """slabs (H, W, 2) = front + bias and back of every pixel, view depths.
+    """slabs (H, W, 2) = low, where a ray enters, and back of every pixel, view depths.
 
-    back is the back-face depth where there is one, else by the model: CONSTANT front + thickness,
-    RELATIVE front·(1 + thickness), SLOPE the constant and the range of depth that the surface spans
-    inside its pixel, IMAGE front + thickness_image. Both are +inf where a pixel cannot be hit:
-    empty, bad depth, or facing away.
+    low is front + bias + slope_bias · `depth_span`, back that of `solid_end`. Both are +inf where a
+    pixel cannot be hit: empty, bad depth, or facing away.
     """
-    has_back = back.shape[0] > 0
     for y in prange(view.height):
         for x in range(view.width):
             z = np.float64(depth[y, x])
@@ -75,16 +74,11 @@ def prepare_slabs(
             z_back = np.inf
             if z > 0.0 and facing < 0.0:
                 low = z + bias
-                z_back = z + thickness
-                if model == RELATIVE:
-                    z_back = z * (1.0 + thickness)
-                elif model == SLOPE:
-                    gx, gy = gradient(view, n, z, facing)
-                    z_back += (abs(gx) + abs(gy)) * (z * z if view.perspective else 1.0)
-                elif model == IMAGE:
-                    z_back = z + np.float64(thickness_image[y, x])
-                if has_back and back[y, x] < np.inf:
-                    z_back = np.float64(back[y, x])
+                if slope_bias > 0.0:
+                    low += slope_bias * depth_span(view, n, z, facing)
+                z_back = solid_end(
+                    view, model, thickness, thickness_image, back, x, y, n, z, facing
+                )
             slabs[y, x, 0] = low
             slabs[y, x, 1] = z_back
 
@@ -193,10 +187,10 @@ def trace(
 ) -> HitBuffer:
     """Trace all rays of a G-buffer.
 
-    Needs depth, geo_normal_vs, normal_vs and reflectivity, and back_depth if `thickness_from` is
-    "back_faces". settings must be resolved (no length None). progress is called with the share
-    of rows done. slips: bits of the published listing that are on, with `Settings.listing`; None:
-    all of them.
+    Needs depth, normal_vs and reflectivity, and back_depth if `thickness_from` is "back_faces".
+    geo_normal_vs is fitted to the depths where it is None or `geo_normals` asks for it. settings
+    must be resolved (no length None). progress is called with the share of rows done. slips: bits
+    of the published listing that are on, with `Settings.listing`; None: all of them.
     """
     prepared = prepare(view, gbuffer, settings, slips)
     for row0, row1 in row_chunks(view.height, 1 if progress is None else 32):
@@ -214,7 +208,6 @@ def prepare(
         raise SettingsError("thickness or max_distance is None; expected Settings.resolved(radius)")
     if settings.tracer == "march" and settings.step is None:
         raise SettingsError("step is None; expected Settings.resolved(radius)")
-    assert gbuffer.geo_normal_vs is not None
     assert gbuffer.normal_vs is not None
     assert gbuffer.reflectivity is not None
     shape = gbuffer.depth.shape
@@ -222,9 +215,10 @@ def prepare(
     if settings.thickness_from == "back_faces":
         assert gbuffer.back_depth is not None
         back = gbuffer.back_depth
-    inputs = Inputs(
-        gbuffer.depth, gbuffer.geo_normal_vs, gbuffer.normal_vs, gbuffer.reflectivity, back
-    )
+    geo_normal = gbuffer.geo_normal_vs
+    if geo_normal is None or settings.geo_normals == "fitted":
+        geo_normal = fit_normals(view, gbuffer.depth)
+    inputs = Inputs(gbuffer.depth, geo_normal, gbuffer.normal_vs, gbuffer.reflectivity, back)
     hits = HitBuffer(
         status=np.empty(shape, np.uint8),
         end=np.empty(shape, np.uint8),
@@ -245,23 +239,23 @@ def prepare(
     start = (tracer, settings.stride, settings.jitter, settings.seed)
     rows: Any
     fixed: tuple[Any, ...]
+    model = MODELS[settings.thickness_from]
+    image = np.empty((0, 0), gbuffer.depth.dtype)
+    if model == IMAGE:
+        assert gbuffer.thickness is not None
+        image = gbuffer.thickness
+    solids = (view, inputs.depth, inputs.geo_normal, back, model, thickness, image)
+    most = thickness if model == CONSTANT else np.inf
     if settings.surface == "plane":
         planes = np.empty((*shape, 4))
-        prepare_planes(view, inputs.depth, inputs.geo_normal, back, thickness, planes)
+        prepare_planes(*solids, planes)
         rows = trace_plane_rows
-        fixed = (*start, max_steps, max_distance, thickness, rounding, *rejects, planes)
+        fixed = (*start, max_steps, max_distance, most, rounding, *rejects, planes)
     else:
         slabs = np.empty((*shape, 2))
         bias = float(settings.bias)
-        model = _MODELS.get(settings.thickness_from, CONSTANT)
-        image = np.empty((0, 0), gbuffer.depth.dtype)
-        if model == IMAGE:
-            assert gbuffer.thickness is not None
-            image = gbuffer.thickness
-        prepare_slabs(
-            view, inputs.depth, inputs.geo_normal, back, model, thickness, image, bias, slabs
-        )
-        most = thickness if model == CONSTANT else np.inf
+        slope_bias = SLOPE_BIAS if settings.self_rejection == "slope_bias" else 0.0
+        prepare_slabs(*solids, bias, slope_bias, slabs)
         fixed = (max_steps, max_distance, most, bias, rounding, *rejects, slabs)
         if settings.listing:
             hits = replace(hits, fade_px=np.empty((*shape, 2)), fade_length=np.empty(shape))
