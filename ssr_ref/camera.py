@@ -59,6 +59,7 @@ class ViewParams(NamedTuple):
     eye_x: float
     eye_y: float
     eye_z: float
+    mirrored: bool = False  # the columns are left-handed: a front face winds the other way
 
 
 @kernel
@@ -319,6 +320,7 @@ class Camera:
             inverse_fy=1.0 / fy,
             near=self.near,
             far=self.far,
+            mirrored=False,
             **columns,
         )
 

@@ -32,6 +32,7 @@ LAYERS = [
     ["depth"],
     ["ssr"],
     ["analytic"],
+    ["planar"],
     ["maths"],
     ["pipeline"],
     ["study"],
@@ -45,6 +46,7 @@ RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 CORE = {"errors", "typed", "_jit", "vecmath", "transforms", "camera", "texture", "scene"}
 CORE |= {"settings", "presets"}
 CORE |= {"buffers", "scenes", "raster", "shading", "depth", "ssr", "analytic", "maths", "pipeline"}
+CORE |= {"planar"}
 OUTSIDE_CORE = {"imageio", "trimesh", "typer", "rich", "OpenEXR", "PIL", "matplotlib"}
 
 

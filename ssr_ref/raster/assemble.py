@@ -16,8 +16,9 @@ from . import clip, coverage, surface
 from .geometry import DOUBLE_SIDED
 from .records import BAND_ROWS, Projected
 
-LEFT, RIGHT, TOP, BOTTOM, NEAR, GUARD, NON_FINITE = 1, 2, 4, 8, 16, 32, 64
-OUTSIDE = LEFT | RIGHT | TOP | BOTTOM | NEAR
+LEFT, RIGHT, TOP, BOTTOM, NEAR, GUARD, NON_FINITE, CUT = 1, 2, 4, 8, 16, 32, 64, 128
+OUTSIDE = LEFT | RIGHT | TOP | BOTTOM | NEAR | CUT
+CLIP = NEAR | GUARD | CUT
 
 # Indices of the counters that `assemble` returns.
 DRAWN, CULLED, ZERO_AREA, OUT_OF_VIEW, CLIPPED, UNUSABLE = 0, 1, 2, 3, 4, 5
@@ -85,8 +86,12 @@ def assemble(
     capacity: int,
     front: I32Array,
     back: I32Array,
+    distance: F64Array,
 ) -> tuple[int, int, int, I32Array, I32Array, F64Array, I64Array]:
     """Clip, cull and classify all triangles in id order.
+
+    distance: (nv,) to the user's clip plane, kept where ≥ 0; it has no elements, and no outcode has
+    the bit CUT, where there is no such plane.
 
     Writes draw records to `front` and `back`, (n, 3) int32 each (see `Bins`). Returns the numbers
     of records, the number of pieces, the pieces' arrays, and the counters.
@@ -97,8 +102,8 @@ def assemble(
     parent = np.empty(capacity, np.int32)
     piece_snapped = np.empty((capacity, 6), np.int32)
     piece_nearness = np.empty((capacity, 2), np.float64)
-    polygon = np.empty((clip.MAX_POLYGON, 4))
-    scratch = np.empty((clip.MAX_POLYGON, 4))
+    polygon = np.empty((clip.MAX_POLYGON, clip.COLUMNS))
+    scratch = np.empty((clip.MAX_POLYGON, clip.COLUMNS))
     corner = np.empty((clip.MAX_POLYGON, 2), np.int64)
     n_front = 0
     n_back = 0
@@ -116,9 +121,11 @@ def assemble(
             counts[OUT_OF_VIEW] += 1
             continue
         pieces = 1
-        if union & (NEAR | GUARD):
+        if union & CLIP:
             counts[CLIPPED] += 1
-            corners = clip_triangle(view, gpu, projected.positions_vs, i0, i1, i2, polygon, scratch)
+            corners = clip_triangle(
+                view, projected.positions_vs, distance, i0, i1, i2, polygon, scratch
+            )
             if corners == 0:
                 counts[OUT_OF_VIEW] += 1
                 continue
@@ -134,7 +141,7 @@ def assemble(
         culled = False
         empty = False
         for piece in range(pieces):
-            if union & (NEAR | GUARD):
+            if union & CLIP:
                 x0, y0 = corner[0, 0], corner[0, 1]
                 x1, y1 = corner[piece + 1, 0], corner[piece + 1, 1]
                 x2, y2 = corner[piece + 2, 0], corner[piece + 2, 1]
@@ -163,12 +170,12 @@ def assemble(
                     covered |= coverage.covers(edges, xa, yb) | coverage.covers(edges, xb, yb)
                 if not covered:
                     continue
-            is_front = area < 0 or flags[t] & DOUBLE_SIDED
+            is_front = (area < 0) != view.mirrored or flags[t] & DOUBLE_SIDED
             if not is_front and not want_back:
                 culled = True
                 continue
             draw_id = t
-            if union & (NEAR | GUARD):
+            if union & CLIP:
                 draw_id = nt + n_pieces
                 parent[n_pieces] = t
                 piece_snapped[n_pieces, 0] = x0
@@ -206,8 +213,8 @@ def assemble(
 @kernel
 def clip_triangle(
     view: ViewParams,
-    gpu: bool,
     positions_vs: F64Array,
+    distance: F64Array,
     i0: int,
     i1: int,
     i2: int,
@@ -223,7 +230,8 @@ def clip_triangle(
         polygon[c, 1] = q.y
         polygon[c, 2] = q.z
         polygon[c, 3] = -p.z
-    return clip.clip_polygon(view, polygon, scratch)
+        polygon[c, 4] = distance[i] if len(distance) else 0.0
+    return clip.clip_polygon(view, len(distance) > 0, polygon, scratch)
 
 
 @driver(parallel=False)
@@ -232,7 +240,7 @@ def count_pieces(faces: I32Array, outcode: U8Array) -> int:
     n = 0
     for t in range(faces.shape[0]):
         union = outcode[faces[t, 0]] | outcode[faces[t, 1]] | outcode[faces[t, 2]]
-        if union & (NEAR | GUARD):
+        if union & CLIP:
             n += clip.MAX_POLYGON - 2
     return n
 

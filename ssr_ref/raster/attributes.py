@@ -69,7 +69,8 @@ def begin_run(view: ViewParams, geometry: Geometry, positions_vs: F64Array, t: i
     n = unit_or_facing(view, normal, v0)
     # The side seen is that of the plane: n·v is the same at every point of it.
     side = dot(n, v0) if view.perspective else -n.z
-    back_side = side > 0.0 and (geometry.triangle_flags[t] & DOUBLE_SIDED) != 0
+    is_back = (side > 0.0) != view.mirrored
+    back_side = is_back and (geometry.triangle_flags[t] & DOUBLE_SIDED) != 0
     if side > 0.0:
         n = Vec3(-n.x, -n.y, -n.z)
     smooth = (geometry.triangle_flags[t] & HAS_NORMALS) != 0

@@ -134,10 +134,19 @@ def draw_visibility(
     depth: Any,
     triangle_id: Any,
     back_depth: Any,
+    distance: F64Array | None = None,
 ) -> tuple[Any, int]:
-    """Fill depth, triangle id and back depth; the counters and the number of clamped pixels."""
+    """Fill depth, triangle id and back depth; the counters and the number of clamped pixels.
+
+    distance: (nv,) of each vertex to a clip plane, as a GPU's clip distance: what is below 0 is cut
+    away. None: no such plane.
+    """
+    if distance is None:
+        distance = np.empty(0)
+    else:
+        projected.outcode[distance < 0.0] |= assemble.CUT
     capacity = 0
-    if (projected.outcode & (assemble.NEAR | assemble.GUARD)).any():
+    if (projected.outcode & assemble.CLIP).any():
         capacity = assemble.count_pieces(geometry.faces, projected.outcode)
     room = len(geometry.faces) + capacity
     front = np.empty((room, 3), np.int32)
@@ -152,6 +161,7 @@ def draw_visibility(
         capacity,
         front,
         back,
+        distance,
     )
     pieces = Pieces(parent[:n_pieces], snapped[:n_pieces], nearness[:n_pieces])
     bands = -(-view.height // BAND_ROWS)
