@@ -34,6 +34,7 @@ LAYERS = [
     ["analytic"],
     ["planar"],
     ["maths"],
+    ["truth"],
     ["pipeline"],
     ["study"],
     ["report"],
@@ -46,7 +47,7 @@ RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 CORE = {"errors", "typed", "_jit", "vecmath", "transforms", "camera", "texture", "scene"}
 CORE |= {"settings", "presets"}
 CORE |= {"buffers", "scenes", "raster", "shading", "depth", "ssr", "analytic", "maths", "pipeline"}
-CORE |= {"planar"}
+CORE |= {"planar", "truth"}
 OUTSIDE_CORE = {"imageio", "trimesh", "typer", "rich", "OpenEXR", "PIL", "matplotlib"}
 
 
