@@ -34,6 +34,12 @@ _WHERE = {
     "GBuffer": "buffers",
     "HitBuffer": "buffers",
     "Resolved": "buffers",
+    "Side": "buffers",
+    "Truth": "buffers",
+    "TruthClass": "buffers",
+    "method_settings": "settings",
+    "preset_settings": "presets",
+    "trace_truth": "truth",
     "Frame": "pipeline",
     "render": "pipeline",
     "load": "fileio.load",
@@ -94,11 +100,14 @@ __all__ = [
     "Resolved",
     "Scene",
     "Settings",
+    "Side",
     "SphereOutcome",
     "SsrRefError",
     "SsrRefWarning",
     "Status",
     "Texture",
+    "Truth",
+    "TruthClass",
     "View",
     "__version__",
     "ball_direction",
@@ -123,10 +132,12 @@ __all__ = [
     "load",
     "load_bundle",
     "look_at",
+    "method_settings",
     "mirror_matrix",
     "octahedral_decode",
     "octahedral_encode",
     "pcg3d",
+    "preset_settings",
     "ray_lengths",
     "ray_setup",
     "reflect",
@@ -134,6 +145,7 @@ __all__ = [
     "srgb_decode",
     "srgb_encode",
     "stored_depth",
+    "trace_truth",
     "two_prod",
     "two_sum",
     "write_bundle",
@@ -145,7 +157,10 @@ if TYPE_CHECKING:
     from .buffers import GBuffer as GBuffer
     from .buffers import HitBuffer as HitBuffer
     from .buffers import Resolved as Resolved
+    from .buffers import Side as Side
     from .buffers import Status as Status
+    from .buffers import Truth as Truth
+    from .buffers import TruthClass as TruthClass
     from .camera import Camera as Camera
     from .camera import View as View
     from .camera import look_at as look_at
@@ -189,6 +204,7 @@ if TYPE_CHECKING:
     from .maths.sphere import intersect_sphere as intersect_sphere
     from .pipeline import Frame as Frame
     from .pipeline import render as render
+    from .presets import preset_settings as preset_settings
     from .scene import DirectionalLight as DirectionalLight
     from .scene import Lights as Lights
     from .scene import Material as Material
@@ -197,8 +213,10 @@ if TYPE_CHECKING:
     from .scene import Primitive as Primitive
     from .scene import Scene as Scene
     from .settings import Settings as Settings
+    from .settings import method_settings as method_settings
     from .texture import Image as Image
     from .texture import Texture as Texture
+    from .truth import trace_truth as trace_truth
 
 
 def __getattr__(name: str) -> Any:

@@ -21,6 +21,7 @@ from typer.main import get_command
 
 from .. import __version__
 from ..errors import SsrRefError, SsrRefWarning
+from .bench import bench
 from .info import info
 from .output import Output
 from .presets import presets
@@ -40,6 +41,7 @@ app = typer.Typer(
 app.command()(render)
 app.command()(info)
 app.command()(presets)
+app.command()(bench)
 app.command()(scenes)
 app.command()(vectors)
 
