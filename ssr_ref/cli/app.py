@@ -24,6 +24,7 @@ from ..errors import SsrRefError, SsrRefWarning
 from .bench import bench
 from .info import info
 from .output import Output
+from .pixel import pixel
 from .presets import presets
 from .render import render
 from .scenes import scenes
@@ -40,6 +41,7 @@ app = typer.Typer(
 )
 app.command()(render)
 app.command()(info)
+app.command()(pixel)
 app.command()(presets)
 app.command()(bench)
 app.command()(scenes)

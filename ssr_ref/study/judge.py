@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..buffers import GBuffer, HitBuffer, Resolved, Status, Truth, TruthClass
+from ..maths.codes import srgb_encode
 from ..settings import Settings
 from ..typed import BoolArray, F64Array
 
