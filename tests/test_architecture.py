@@ -36,6 +36,7 @@ LAYERS = [
     ["maths"],
     ["truth"],
     ["pipeline"],
+    ["blame"],
     ["study"],
     ["report"],
     ["meshfiles"],
@@ -47,7 +48,7 @@ RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 CORE = {"errors", "typed", "_jit", "vecmath", "transforms", "camera", "texture", "scene"}
 CORE |= {"settings", "presets"}
 CORE |= {"buffers", "scenes", "raster", "shading", "depth", "ssr", "analytic", "maths", "pipeline"}
-CORE |= {"planar", "truth"}
+CORE |= {"blame", "planar", "truth"}
 OUTSIDE_CORE = {"imageio", "trimesh", "typer", "rich", "OpenEXR", "PIL", "matplotlib"}
 
 

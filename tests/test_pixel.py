@@ -77,7 +77,7 @@ def test_a_pixel_without_a_ray(folder: Path, capsys: pytest.CaptureFixture) -> N
     walk = data["methods"]["dda"]
     assert walk["status"] in ("BACKGROUND", "NOT_REFLECTIVE") and walk["rows"] == []
     assert walk["hit_depth"] is None and walk["hit_px"] == [None, None]
-    assert main(["pixel", "teapot", "32", "14", "--size", "64x36"]) == 0
+    assert main(["pixel", "poles", "0", "0", "--size", "64x36"]) == 0
     assert "nothing was walked" in capsys.readouterr().out
 
 

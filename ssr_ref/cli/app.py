@@ -22,6 +22,7 @@ from typer.main import get_command
 from .. import __version__
 from ..errors import SsrRefError, SsrRefWarning
 from .bench import bench
+from .blame import blame
 from .info import info
 from .output import Output
 from .pixel import pixel
@@ -44,6 +45,7 @@ app.command()(info)
 app.command()(pixel)
 app.command()(presets)
 app.command()(bench)
+app.command()(blame)
 app.command()(scenes)
 app.command()(vectors)
 

@@ -73,6 +73,17 @@ _HEAT_POINTS: tuple[Rgb8, ...] = (
     (254, 246, 167),
 )
 
+# Three steps of lightness to either side of black.
+_DIVERGING_POINTS: tuple[Rgb8, ...] = (
+    (190, 228, 255),
+    (92, 168, 250),
+    (38, 92, 200),
+    (22, 22, 26),
+    (186, 74, 12),
+    (250, 150, 50),
+    (255, 226, 170),
+)
+
 
 def _ramp(points: tuple[Rgb8, ...]) -> U8Array:
     """(256, 3) sRGB bytes, linear between equally spaced control points; read-only."""
@@ -93,6 +104,8 @@ def to_bytes(share: AnyArray) -> U8Array:
 
 HEAT = _ramp(_HEAT_POINTS)
 """Dark blue, red, yellow: lightness rises evenly, so more is always lighter."""
+DIVERGING = _ramp(_DIVERGING_POINTS)
+"""Blue below 0, black in the middle, orange above: lighter is further from 0."""
 GREY = _ramp(((0, 0, 0), (255, 255, 255)))
 """Byte i is i: for shares (0 to 1) and depths."""
 

@@ -152,9 +152,8 @@ def heat_picture(counts: Mapping[str, U32Array]) -> bytes:
     from matplotlib.colors import ListedColormap, LogNorm
 
     most = max(2, *(int(image.max()) for image in counts.values()))
-    heat = ListedColormap(colors.HEAT.astype(float) / 255.0).with_extremes(
-        bad=tuple(c / 255.0 for c in colors.BLANK)
-    )
+    r, g, b = (c / 255.0 for c in colors.BLANK)
+    heat = ListedColormap(colors.HEAT.astype(float) / 255.0).with_extremes(bad=(r, g, b))
     height, width = next(iter(counts.values())).shape
     with mpl.rc_context({"font.size": 9}):
         columns = min(len(counts), 2)

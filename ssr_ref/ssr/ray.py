@@ -171,6 +171,28 @@ def set_up_ray(
 
     depth is finite or bad, never the background's +inf. Normals need not be unit.
     """
+    mirror = Vec3(0.0, 0.0, 0.0)
+    return start_ray(view, x, y, depth, shading_normal, geo_normal, max_distance, 0.0, 0.0, mirror)
+
+
+@kernel
+def start_ray(
+    view: ViewParams,
+    x: int,
+    y: int,
+    depth: float,
+    shading_normal: Vec3,
+    geo_normal: Vec3,
+    max_distance: float,
+    move_x: float,
+    move_y: float,
+    direction: Vec3,
+) -> tuple[int, Ray]:
+    """`set_up_ray`, of a ray that may start beside the centre and leave another way.
+
+    move_x, move_y: from the centre to the start, pixels; depth and mirror direction stay those of
+    the centre. direction: unit, view space; zero: the mirror direction.
+    """
     # Check the surface point.
     px, py = x + 0.5, y + 0.5
     if not (depth > 0.0 and np.isfinite(depth)):
@@ -185,8 +207,11 @@ def set_up_ray(
         return no_ray(INVALID_INPUT)
 
     # Reflect the pixel's ray.
+    px, py = px + move_x, py + move_y
     origin = point_at(view, px, py, depth)
-    r = normalize(reflect(normalize(d), normalize(shading_normal)))
+    r = direction
+    if not dot(direction, direction) > 0.0:
+        r = normalize(reflect(normalize(d), normalize(shading_normal)))
     if not dot(r, geo_normal) > 0.0:
         return no_ray(BELOW_SURFACE)
 

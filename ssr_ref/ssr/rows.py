@@ -10,9 +10,10 @@ from .._jit import inlined, kernel
 from ..buffers import STATUS_OF_END, End, Flag, Status
 from ..camera import ViewParams
 from ..typed import F64Array, FloatArray, U8Array, U32Array
+from ..vecmath.vec import Vec3
 from .hit import load3
 from .march_cells import OWN_PIXEL, CellWalk
-from .ray import WALK, Ray, length_at, no_ray, set_up_ray
+from .ray import WALK, Ray, length_at, no_ray, start_ray
 
 CELLS, DDA = 0, 1
 """Which pixels a ray reads: all that it crosses, or one a stride."""
@@ -26,6 +27,8 @@ FLAG_PASSED_BEHIND, FLAG_SELF = int(Flag.PASSED_BEHIND), int(Flag.SELF_REJECTED)
 OUT_OF_STEPS = int(End.OUT_OF_STEPS)
 END_TO_STATUS = int(STATUS_OF_END)
 
+NO_IMAGE, NO_VECTORS = np.empty((0, 0)), np.empty((0, 0, 0))
+
 
 class Inputs(NamedTuple):
     """The G-buffer as tracers read it; back has no pixels if thickness is constant."""
@@ -35,6 +38,11 @@ class Inputs(NamedTuple):
     normal: FloatArray  # (H, W, 3)
     reflectivity: FloatArray  # (H, W, 3)
     back: FloatArray  # (H, W) or (0, 0)
+    # Where rays start, for who changes what they meet or how they leave (`blame`):
+    origin: F64Array = NO_IMAGE  # (H, W) depth they start from; (0, 0): depth itself
+    direction: F64Array = NO_VECTORS  # (H, W, 3) as in `start_ray`; (0, 0, 0): the mirror direction
+    move_x: float = 0.0  # as in `start_ray`
+    move_y: float = 0.0
 
 
 class Outputs(NamedTuple):
@@ -89,7 +97,23 @@ def open_pixel(
         out.status[y, x] = NOT_REFLECTIVE
         return False, no_ray(NOT_REFLECTIVE)[1]
     normal, geo_normal = load3(inputs.normal, y, x), load3(inputs.geo_normal, y, x)
-    status, ray = set_up_ray(view, x, y, z, normal, geo_normal, max_distance)
+    if inputs.origin.shape[0] > 0:
+        z = inputs.origin[y, x]
+    direction = Vec3(0.0, 0.0, 0.0)
+    if inputs.direction.shape[0] > 0:
+        direction = load3(inputs.direction, y, x)
+    status, ray = start_ray(
+        view,
+        x,
+        y,
+        z,
+        normal,
+        geo_normal,
+        max_distance,
+        inputs.move_x,
+        inputs.move_y,
+        direction,
+    )
     if status == WALK and not ray.s_end > OWN_PIXEL:
         out.end[y, x] = ray.end
         status = miss_status(0, ray.end)

@@ -14,6 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from ..blame.charges import hit_objects, pixel_distances
+from ..blame.screen import (
+    RELATIVE_FLOOR,
+    fallback_of,
+    finite,
+    knowable_reflection,
+    true_reflection,
+)
 from ..buffers import GBuffer, HitBuffer, Resolved, Status, Truth, TruthClass
 from ..maths.codes import srgb_encode
 from ..settings import Settings
@@ -21,8 +29,6 @@ from ..typed import BoolArray, F64Array
 
 RIGHT_PX = 1.0
 """A hit further than this from X is wrong."""
-RELATIVE_FLOOR = 1e-2
-"""Added to T² in relMSE, so that black pixels do not count without end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,27 +110,28 @@ def judge(
 
     flip: also FLIP, if its package is installed.
     """
-    assert gbuffer.object_id is not None
+    fallback = fallback_of(settings)
     ray = truth.truth != TruthClass.NO_RAY
     visible = truth.truth == TruthClass.VISIBLE
-    expected = true_reflection(truth, settings)
+    expected = true_reflection(truth, fallback)
     if traced is None:
         hit = right = visible
         distances = np.zeros(int(visible.sum()))
-        shown = knowable_reflection(truth, settings)
+        shown = knowable_reflection(truth, fallback)
     else:
         hits, resolved = traced
         hit = ray & (hits.status == Status.HIT)
-        off = hits.hit_px - truth.hit_px
-        distance = np.sqrt(off[..., 0] * off[..., 0] + off[..., 1] * off[..., 1])
-        same = hit & visible & (met_object(hits, gbuffer) == truth.object_id)
+        distance = pixel_distances(hits, truth)
+        shows = hit_objects(gbuffer, hits)
+        assert shows is not None
+        same = hit & visible & (shows == truth.object_id)
         right = same & (distance <= RIGHT_PX)
         distances = np.sort(distance[same])
         shown = resolved.reflection.astype(np.float64)
     wrong = (visible & ~right) | (ray & ~visible & hit)
-    finite = ray & np.isfinite(shown).all(axis=2) & np.isfinite(expected).all(axis=2)
-    error = shown[finite] - expected[finite]
-    squares = (error * error / (expected[finite] * expected[finite] + RELATIVE_FLOOR)).mean(axis=1)
+    known = ray & finite(shown) & finite(expected)
+    error = shown[known] - expected[known]
+    squares = (error * error / (expected[known] * expected[known] + RELATIVE_FLOOR)).mean(axis=1)
     return Judged(
         rays=int(ray.sum()),
         visible=int(visible.sum()),
@@ -133,40 +140,9 @@ def judge(
         wrong_rays=int(wrong.sum()),
         distances=distances,
         squares=float(squares.sum()),
-        flips=flip_sum(expected, shown, finite) if flip else np.nan,
-        non_finite=int((ray & ~finite).sum()),
+        flips=flip_sum(expected, shown, known) if flip else np.nan,
+        non_finite=int((ray & ~known).sum()),
     )
-
-
-def fallback_of(settings: Settings) -> F64Array:
-    """(3,) what a miss shows."""
-    color = settings.fallback_color if settings.fallback == "constant" else (0.0, 0.0, 0.0)
-    return np.array(color, np.float64)
-
-
-def true_reflection(truth: Truth, settings: Settings) -> F64Array:
-    """(H, W, 3) radiance of X, the fallback where there is none."""
-    met = (truth.truth > TruthClass.NOTHING)[..., None]
-    out: F64Array = np.where(met, truth.radiance, fallback_of(settings))
-    return out
-
-
-def knowable_reflection(truth: Truth, settings: Settings) -> F64Array:
-    """(H, W, 3) radiance of X where the camera sees it, else the fallback."""
-    seen = (truth.truth == TruthClass.VISIBLE)[..., None]
-    out: F64Array = np.where(seen, truth.radiance, fallback_of(settings))
-    return out
-
-
-def met_object(hits: HitBuffer, gbuffer: GBuffer) -> Any:
-    """(H, W) int32 object at the pixel of each hit; −1 without a hit."""
-    assert gbuffer.object_id is not None
-    height, width = gbuffer.object_id.shape
-    hit = hits.status == Status.HIT
-    px = np.where(hit[..., None], hits.hit_px, 0.0)
-    x = np.clip(np.floor(px[..., 0]).astype(np.int64), 0, width - 1)
-    y = np.clip(np.floor(px[..., 1]).astype(np.int64), 0, height - 1)
-    return np.where(hit, gbuffer.object_id[y, x], -1)
 
 
 def flip_sum(expected: F64Array, shown: F64Array, where: BoolArray) -> float:
