@@ -141,6 +141,7 @@ def test_relative_squared_error_by_hand_and_non_finite_apart() -> None:
     assert np.isnan(found.flip) and found.to_json()["flip"] is None
 
 
+@pytest.mark.slow
 def test_flip_is_0_for_equal_images_and_large_for_white_on_black() -> None:
     pytest.importorskip("flip_evaluator")
     frame, truth = one_row([(TruthClass.VISIBLE, 0.0, 1)] * 3)

@@ -19,6 +19,8 @@ from ssr_ref.ssr.ray import set_up_ray, start_ray
 from ssr_ref.ssr.trace import trace
 from ssr_ref.vecmath.vec import Vec3
 
+pytestmark = pytest.mark.slow  # compiles much
+
 NOTHING = Rerun(0)
 X, Y = 5, 15
 """The only pixel that reflects."""

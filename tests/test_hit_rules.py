@@ -19,6 +19,8 @@ from ssr_ref.analytic.scenes import SCENES
 from ssr_ref.errors import SettingsError
 from ssr_ref.ssr.trace import prepare, trace
 
+pytestmark = pytest.mark.slow  # compiles much
+
 SIZE = (101, 67)
 MODELS = ("constant", "back_faces", "relative", "slope", "material")
 

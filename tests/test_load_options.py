@@ -159,7 +159,7 @@ def rendered(monkeypatch, tmp_path):
 
     scenes = []
 
-    def render(scene, camera=None, settings=None, *, progress=None):
+    def render(scene, camera=None, settings=None, *, more=None, progress=None):
         scenes.append(scene)
         return made_up_render(scene, camera, settings, progress=progress)
 

@@ -81,6 +81,7 @@ def test_a_pixel_without_a_ray(folder: Path, capsys: pytest.CaptureFixture) -> N
     assert "nothing was walked" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_files(folder: Path, capsys: pytest.CaptureFixture) -> None:
     pytest.importorskip("matplotlib")
     from PIL import Image

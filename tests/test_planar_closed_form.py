@@ -25,6 +25,8 @@ from ssr_ref.raster.rasterize import RasterOptions, rasterize
 from ssr_ref.scene import Lights
 from ssr_ref.scenes import shapes
 
+pytestmark = pytest.mark.slow  # compiles much
+
 SIZE = (97, 61)
 REACH = 16.0
 """Half the side of the squares that stand for endless planes; hits beyond are not compared."""

@@ -27,6 +27,8 @@ from ssr_ref.truth import trace_truth
 from ssr_ref.truth.closed_form import analytic_truth
 from ssr_ref.truth.reflections import mesh_reflections
 
+pytestmark = pytest.mark.slow  # compiles much
+
 SIZE = (47, 31)
 MIRROR = Material("mirror", (0.9, 0.9, 0.9), metallic=1.0, roughness=0.0)
 RED = Material("red", (0.8, 0.2, 0.1), emissive=(0.1, 0.0, 0.2))
