@@ -23,7 +23,7 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 
 from ssr_ref import Settings, scenes
-from ssr_ref.cli.render import parse_size
+from ssr_ref.cli.parsing import parse_size
 from ssr_ref.pipeline import make_camera
 from ssr_ref.raster.geometry import DOUBLE_SIDED, flatten
 from ssr_ref.raster.rasterize import RasterOptions, rasterize

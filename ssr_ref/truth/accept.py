@@ -17,11 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from .._jit import inlined, kernel
-from ..raster.geometry import DOUBLE_SIDED, MASKED
+from ..raster.geometry import MASKED
 from ..raster.surface import Barycentric
 from ..raster.textures import Textures, passes_mask
 from ..typed import F64Array, I32Array
-from .bvh import Bvh
 from .triangle import Meeting
 
 NO_ID = 2**31 - 1
@@ -53,12 +52,10 @@ def solid() -> Cutout:
     return Cutout(np.empty((0, 3), np.int32), np.empty(0, np.int32), None)
 
 
-@kernel
-def load_guard(guard: F64Array, i: int) -> Guard:
-    """Row i of an (n, 4) array; no rows: every crossing ahead of the origin is above."""
-    if guard.shape[0] == 0:
-        return Guard(1.0, 0.0, 0.0, 0.0)
-    return Guard(guard[i, 0], guard[i, 1], guard[i, 2], guard[i, 3])
+@inlined
+def load_guard(guards: F64Array, i: int) -> Guard:
+    """Row i of an (n, 4) array."""
+    return Guard(guards[i, 0], guards[i, 1], guards[i, 2], guards[i, 3])
 
 
 @kernel
@@ -70,27 +67,26 @@ def is_above(guard: Guard, t: float) -> bool:
 
 @inlined
 def accepts(
-    bvh: Bvh,
     faces: I32Array,
     material: I32Array,
     textures: Textures | None,
-    k: int,
+    guards: F64Array,
+    i: int,
+    triangle: int,
+    flags: int,
     m: Meeting,
-    guard: Guard,
-    skip: int,
     t_best: float,
     id_best: int,
 ) -> bool:
-    """Whether a crossing of triangle k (in leaf order) is a hit nearer than the best so far."""
+    """Whether ray i's crossing of a triangle is a hit nearer than the best so far.
+
+    guards: rows of `Guard`, or none; triangle, flags: its number and bits.
+    """
     if not (m.met and m.t > 0.0 and m.t <= t_best):
         return False
-    triangle = bvh.ids[k]
-    if triangle == skip or (m.t == t_best and triangle >= id_best):
+    if m.t == t_best and triangle >= id_best:
         return False
-    flags = bvh.flags[k]
-    if not m.front and (flags & DOUBLE_SIDED) == 0:
-        return False
-    if not is_above(guard, m.t):
+    if guards.shape[0] > 0 and not is_above(load_guard(guards, i), m.t):
         return False
     if textures is not None:
         if (flags & MASKED) != 0:

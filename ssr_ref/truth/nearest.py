@@ -18,13 +18,14 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined, kernel
+from ..raster.geometry import DOUBLE_SIDED
 from ..raster.surface import load
 from ..raster.textures import Textures
 from ..typed import BoolArray, F32Array, F64Array, I32Array, I64Array
 from ..vecmath.vec import Vec3
-from .accept import NO_ID, Cutout, accepts, load_guard, solid
+from .accept import NO_ID, Cutout, accepts, solid
 from .bvh import STACK, Bvh
-from .triangle import Shear, meet, shear_of
+from .triangle import Meeting, apart, is_traced, meet, shear_of
 
 CHUNK = 256
 """Rays that one thread takes at a time."""
@@ -157,9 +158,9 @@ def enters(boxes: F32Array, node: int, at: int, s: Slabs, t_best: float) -> floa
 
 
 @inlined
-def root_of(bvh: Bvh) -> int:
+def root_of(children: I32Array) -> int:
     """The node to start at: 0 only if the whole scene is one leaf."""
-    return 1 if bvh.children.shape[0] > 1 else 0
+    return 1 if children.shape[0] > 1 else 0
 
 
 @kernel
@@ -173,26 +174,27 @@ def walk(
     first_only: bool,
     stack: I64Array,
     stack_t: F64Array,
-) -> tuple[int, float]:
-    """(triangle in leaf order or −1, t) that ray i meets first, or (first_only) meets at all.
+) -> tuple[int, Meeting]:
+    """The triangle (NO_ID: none) that ray i meets first, or (first_only) at all, and where.
 
     stack, stack_t: (STACK,) scratch.
     """
     o, d = load(rays.origin, i), load(rays.direction, i)
-    ray = shear_of(o, d)
-    t_best, id_best, k_best = rays.t_max, NO_ID, -1
-    if not ray.traced:
-        return -1, np.inf
+    t_best, id_best, best = rays.t_max, NO_ID, apart()
+    if not is_traced(o, d):
+        return NO_ID, best
+    boxes, children, corners = bvh.boxes, bvh.children, bvh.corners
+    ids, flags, guards = bvh.ids, bvh.flags, rays.guard
     skip = rays.skip[i] if rays.skip.shape[0] > 0 else np.int32(-1)
-    guard = load_guard(rays.guard, i)
+    ray = shear_of(o, d)
     slabs = slabs_of(o, d, bvh.reach)
     waiting = 0
-    node = np.int64(root_of(bvh))
+    node = np.int64(root_of(children))
     while True:
         if node >= 0:
-            t0 = enters(bvh.boxes, node, 0, slabs, t_best)
-            t1 = enters(bvh.boxes, node, 6, slabs, t_best)
-            c0, c1 = np.int64(bvh.children[node, 0]), np.int64(bvh.children[node, 1])
+            t0 = enters(boxes, node, 0, slabs, t_best)
+            t1 = enters(boxes, node, 6, slabs, t_best)
+            c0, c1 = np.int64(children[node, 0]), np.int64(children[node, 1])
             if t0 < np.inf and t1 < np.inf:
                 if t0 <= t1:
                     node, stack[waiting], stack_t[waiting] = c0, c1, t1
@@ -209,46 +211,41 @@ def walk(
         else:
             leaf = ~node
             for k in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
-                m = meet(ray, bvh.corners, k)
-                if accepts(bvh, faces, material, textures, k, m, guard, skip, t_best, id_best):
-                    t_best, id_best, k_best = m.t, bvh.ids[k], k
+                if ids[k] == skip:
+                    continue
+                m = meet(ray, corners, k, (flags[k] & DOUBLE_SIDED) != 0)
+                if accepts(
+                    faces, material, textures, guards, i, ids[k], flags[k], m, t_best, id_best
+                ):
+                    t_best, id_best, best = m.t, ids[k], m
                     if first_only:
-                        return k_best, t_best
+                        return id_best, best
         while waiting > 0 and stack_t[waiting - 1] > t_best:
             waiting -= 1
         if waiting == 0:
             break
         waiting -= 1
         node = stack[waiting]
-    return k_best, t_best
+    return id_best, best
 
 
 @kernel
 def store_hit(
-    bvh: Bvh,
-    ray: Shear,
-    k: int,
     i: int,
+    triangle: int,
+    m: Meeting,
     triangle_id: I32Array,
     t: F64Array,
     weights: F64Array,
     front: BoolArray,
 ) -> None:
-    """Ray i meets triangle k (in leaf order), −1 for none."""
-    if k < 0:
-        triangle_id[i] = -1
-        t[i] = np.inf
-        front[i] = False
-        for c in range(3):
-            weights[i, c] = np.nan
-        return
-    m = meet(ray, bvh.corners, k)
-    triangle_id[i] = bvh.ids[k]
+    """Ray i meets a triangle, NO_ID for none."""
+    triangle_id[i] = triangle if m.met else -1
     t[i] = m.t
-    front[i] = m.front
     weights[i, 0] = m.b0
     weights[i, 1] = m.b1
     weights[i, 2] = m.b2
+    front[i] = m.front
 
 
 @driver()
@@ -275,6 +272,5 @@ def trace_nearest(
         stack = np.empty(STACK, np.int64)
         stack_t = np.empty(STACK)
         for i in range(chunk * CHUNK, min(n, (chunk + 1) * CHUNK)):
-            k, _ = walk(bvh, faces, material, textures, rays, i, first_only, stack, stack_t)
-            ray = shear_of(load(origin, i), load(direction, i))
-            store_hit(bvh, ray, k, i, triangle_id, t, weights, front)
+            triangle, m = walk(bvh, faces, material, textures, rays, i, first_only, stack, stack_t)
+            store_hit(i, triangle, m, triangle_id, t, weights, front)

@@ -17,13 +17,15 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined, kernel
+from ..raster.geometry import DOUBLE_SIDED
 from ..raster.surface import load
 from ..raster.textures import Textures
 from ..typed import BoolArray, F32Array, F64Array, I32Array, I64Array
-from .accept import NO_ID, Cutout, accepts, load_guard, solid
+from ..vecmath.vec import Vec3
+from .accept import NO_ID, Cutout, accepts, solid
 from .bvh import STACK, Bvh
 from .nearest import Hits, Rays, empty_hits, root_of, slabs_of, store_hit
-from .triangle import Shear, meet, shear_of
+from .triangle import Shear, apart, is_traced, main_axis, meet, shear_of
 
 LANES = 16
 PACKET_CHUNK = 1024
@@ -57,20 +59,32 @@ def nearest(bvh: Bvh, rays: Rays, cutout: Cutout | None = None) -> Hits:
 
 @kernel
 def sort_rays(
-    origin: F64Array, direction: F64Array, first: int, end: int, order: I64Array, start: I64Array
+    origin: F64Array,
+    direction: F64Array,
+    first: int,
+    end: int,
+    group: I64Array,
+    order: I64Array,
+    start: I64Array,
 ) -> None:
     """Write the chunk's rays to `order` by group: group g at start[g] : start[g + 1].
 
-    Rays that are not traced come last. start: (GROUPS + 2,).
+    Rays that are not traced come last. group: scratch; start: (GROUPS + 2,).
     """
     for g in range(GROUPS + 2):
         start[g] = 0
     for i in range(first, end):
-        start[group_of(origin, direction, i) + 1] += 1
+        o, d = load(origin, i), load(direction, i)
+        g = GROUPS
+        if is_traced(o, d):
+            octant = (1 if d.x < 0.0 else 0) | (2 if d.y < 0.0 else 0) | (4 if d.z < 0.0 else 0)
+            g = octant * 3 + main_axis(d)
+        group[i - first] = g
+        start[g + 1] += 1
     for g in range(GROUPS + 1):
         start[g + 1] += start[g]
     for i in range(first, end):
-        g = group_of(origin, direction, i)
+        g = group[i - first]
         order[start[g]] = i
         start[g] += 1
     for g in range(GROUPS + 1, 0, -1):
@@ -79,21 +93,9 @@ def sort_rays(
 
 
 @kernel
-def group_of(origin: F64Array, direction: F64Array, i: int) -> int:
-    """Group of ray i, GROUPS if it is not traced."""
-    d = load(direction, i)
-    ray = shear_of(load(origin, i), d)
-    if not ray.traced:
-        return GROUPS
-    octant = (1 if d.x < 0.0 else 0) | (2 if d.y < 0.0 else 0) | (4 if d.z < 0.0 else 0)
-    return octant * 3 + ray.kz
-
-
-@kernel
-def load_lane(bvh_reach: float, rays: Rays, i: int, lane: int, p: F64Array) -> None:
-    """Write ray i into a lane of the packet's state."""
-    o, d = load(rays.origin, i), load(rays.direction, i)
-    s = slabs_of(o, d, bvh_reach)
+def load_lane(o: Vec3, d: Vec3, reach: float, t_max: float, lane: int, p: F64Array) -> None:
+    """Write the ray o + t·d into a lane of the packet's state."""
+    s = slabs_of(o, d, reach)
     ray = shear_of(o, d)
     p[lane + LANES * INVERSE] = s.inverse_x
     p[lane + LANES * (INVERSE + 1)] = s.inverse_y
@@ -110,7 +112,23 @@ def load_lane(bvh_reach: float, rays: Rays, i: int, lane: int, p: F64Array) -> N
     p[lane + LANES * SHEAR_X] = ray.sx
     p[lane + LANES * SHEAR_Y] = ray.sy
     p[lane + LANES * SLOPE] = ray.dz
-    p[lane + LANES * BEST] = rays.t_max
+    p[lane + LANES * BEST] = t_max
+
+
+@inlined
+def lane_shear(lead: Shear, j: int, p: F64Array) -> Shear:
+    """The ray of lane j; lead: one of its group."""
+    return Shear(
+        lead.kx,
+        lead.ky,
+        lead.kz,
+        p[j + ORIGIN * LANES],
+        p[j + (ORIGIN + 1) * LANES],
+        p[j + (ORIGIN + 2) * LANES],
+        p[j + SHEAR_X * LANES],
+        p[j + SHEAR_Y * LANES],
+        p[j + SLOPE * LANES],
+    )
 
 
 @inlined
@@ -205,28 +223,36 @@ def walk_packet(
     p: F64Array,
     lanes: I64Array,
     stack: I64Array,
+    triangle_id: I32Array,
+    t: F64Array,
+    weights: F64Array,
+    front: BoolArray,
 ) -> None:
-    """Trace rays order[first : first + count], all of one group.
+    """Trace rays order[first : first + count], all of one group, into the arrays of `Hits`.
 
-    Leaves the triangle (in leaf order or −1) of lane j in lanes[j]; lanes (2·LANES,), p
-    (ROWS·LANES,) and stack (STACK,) are scratch.
+    p (ROWS·LANES,), lanes (LANES,) for the triangle of each, and stack (STACK,) are scratch.
     """
+    boxes, children, corners = bvh.boxes, bvh.children, bvh.corners
+    ids, flags = bvh.ids, bvh.flags
+    origin, direction, guards, skips = rays.origin, rays.direction, rays.guard, rays.skip
     for j in range(LANES):
-        load_lane(bvh.reach, rays, order[first + min(j, count - 1)], j, p)
-        lanes[j] = -1
-        lanes[j + LANES] = NO_ID
+        i = order[first + min(j, count - 1)]
+        load_lane(load(origin, i), load(direction, i), bvh.reach, rays.t_max, j, p)
+        lanes[j] = NO_ID
+        store_hit(i, NO_ID, apart(), triangle_id, t, weights, front)
         if j >= count:
             p[j + BEST * LANES] = -np.inf
-    lead = shear_of(load(rays.origin, order[first]), load(rays.direction, order[first]))
+    lead = shear_of(load(origin, order[first]), load(direction, order[first]))
     sign = 1.0 if lead.dz > 0.0 else -1.0
-    low_x, low_y, low_z = 0 if p[0] > 0.0 else 3, 0 if p[LANES] > 0.0 else 3, 0
+    low_x = 0 if p[0] > 0.0 else 3
+    low_y = 0 if p[LANES] > 0.0 else 3
     low_z = 0 if p[2 * LANES] > 0.0 else 3
     waiting = 0
-    node = np.int64(root_of(bvh))
+    node = np.int64(root_of(children))
     while True:
         if node >= 0:
-            n0, n1, ordered = enter_children(bvh.boxes, node, low_x, low_y, low_z, p)
-            c0, c1 = np.int64(bvh.children[node, 0]), np.int64(bvh.children[node, 1])
+            n0, n1, ordered = enter_children(boxes, node, low_x, low_y, low_z, p)
+            c0, c1 = np.int64(children[node, 0]), np.int64(children[node, 1])
             if n0 > 0 and n1 > 0:
                 if 2 * ordered >= min(n0, n1):
                     node, stack[waiting] = c0, c1
@@ -243,32 +269,32 @@ def walk_packet(
         else:
             leaf = ~node
             for k in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
-                if ask_lanes(bvh.corners, k, lead.kx, lead.ky, lead.kz, sign, p) == 0:
+                if ask_lanes(corners, k, lead.kx, lead.ky, lead.kz, sign, p) == 0:
                     continue
                 for j in range(count):
                     if p[j + ASKED * LANES] == 0.0:
                         continue
-                    ray = Shear(
-                        lead.kx,
-                        lead.ky,
-                        lead.kz,
-                        p[j + ORIGIN * LANES],
-                        p[j + (ORIGIN + 1) * LANES],
-                        p[j + (ORIGIN + 2) * LANES],
-                        p[j + SHEAR_X * LANES],
-                        p[j + SHEAR_Y * LANES],
-                        p[j + SLOPE * LANES],
-                        True,
-                    )
                     i = order[first + j]
-                    skip = rays.skip[i] if rays.skip.shape[0] > 0 else np.int32(-1)
-                    guard = load_guard(rays.guard, i)
-                    best, best_id = p[j + BEST * LANES], lanes[j + LANES]
-                    m = meet(ray, bvh.corners, k)
-                    if accepts(bvh, faces, material, textures, k, m, guard, skip, best, best_id):
+                    if skips.shape[0] > 0 and ids[k] == skips[i]:
+                        continue
+                    both_sides = (flags[k] & DOUBLE_SIDED) != 0
+                    m = meet(lane_shear(lead, j, p), corners, k, both_sides)
+                    t_best, id_best = p[j + BEST * LANES], lanes[j]
+                    if accepts(
+                        faces,
+                        material,
+                        textures,
+                        guards,
+                        i,
+                        ids[k],
+                        flags[k],
+                        m,
+                        t_best,
+                        id_best,
+                    ):
                         p[j + BEST * LANES] = m.t
-                        lanes[j] = k
-                        lanes[j + LANES] = bvh.ids[k]
+                        lanes[j] = ids[k]
+                        store_hit(i, ids[k], m, triangle_id, t, weights, front)
         if waiting == 0:
             break
         waiting -= 1
@@ -296,23 +322,33 @@ def trace_packets(
     for chunk in prange((n + PACKET_CHUNK - 1) // PACKET_CHUNK):
         rays = Rays(origin, direction, skip, guard, t_max)
         begin, end = chunk * PACKET_CHUNK, min(n, (chunk + 1) * PACKET_CHUNK)
-        order = np.empty(PACKET_CHUNK, np.int64)
+        group, order = np.empty(PACKET_CHUNK, np.int64), np.empty(PACKET_CHUNK, np.int64)
         start = np.empty(GROUPS + 2, np.int64)
         p = np.zeros(ROWS * LANES)
-        lanes = np.empty(2 * LANES, np.int64)
+        lanes = np.empty(LANES, np.int64)
         stack = np.empty(STACK, np.int64)
-        sort_rays(origin, direction, begin, end, order, start)
-        for g in range(GROUPS + 1):
+        sort_rays(origin, direction, begin, end, group, order, start)
+        for g in range(GROUPS):
             first = start[g]
             while first < start[g + 1]:
                 count = min(LANES, start[g + 1] - first)
-                if g < GROUPS:
-                    walk_packet(
-                        bvh, faces, material, textures, rays, order, first, count, p, lanes, stack
-                    )
-                for j in range(count):
-                    i = order[first + j]
-                    ray = shear_of(load(origin, i), load(direction, i))
-                    k = lanes[j] if g < GROUPS else np.int64(-1)
-                    store_hit(bvh, ray, k, i, triangle_id, t, weights, front)
+                walk_packet(
+                    bvh,
+                    faces,
+                    material,
+                    textures,
+                    rays,
+                    order,
+                    first,
+                    count,
+                    p,
+                    lanes,
+                    stack,
+                    triangle_id,
+                    t,
+                    weights,
+                    front,
+                )
                 first += count
+        for slot in range(start[GROUPS], start[GROUPS + 1]):
+            store_hit(order[slot], NO_ID, apart(), triangle_id, t, weights, front)

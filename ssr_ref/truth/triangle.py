@@ -57,14 +57,13 @@ class Shear(NamedTuple):
     sx: float  # d_x/d_z, d_y/d_z
     sy: float
     dz: float
-    traced: bool  # False: nothing can be met
 
 
 class Meeting(NamedTuple):
-    """Where a line crosses a triangle; met False leaves the rest meaningless.
+    """Where a line crosses a triangle; met False: nowhere.
 
-    t: in units of the direction, of either sign. Weights of the corners, each ≥ 0, sum 1 to
-    rounding. front: from the side that sees the corners counter-clockwise.
+    t: in units of the direction, of either sign, inf if not met. Weights of the corners, each ≥ 0,
+    sum 1 to rounding. front: from the side that sees the corners counter-clockwise.
     """
 
     met: bool
@@ -75,18 +74,32 @@ class Meeting(NamedTuple):
     front: bool
 
 
+@inlined
+def is_traced(o: Vec3, d: Vec3) -> bool:
+    """Whether the ray o + t·d can be traced; one that cannot meets nothing."""
+    most = max(abs(d.x), abs(d.y), abs(d.z))
+    far = max(abs(o.x), abs(o.y), abs(o.z))
+    return is_finite(o) and is_finite(d) and SMALLEST <= most <= LARGEST and far <= LARGEST
+
+
+@inlined
+def main_axis(d: Vec3) -> int:
+    """The axis that d runs along most; ties to z, then x."""
+    ax, ay, az = abs(d.x), abs(d.y), abs(d.z)
+    if az >= ax and az >= ay:
+        return 2
+    return 0 if ax >= ay else 1
+
+
 @kernel
 def shear_of(o: Vec3, d: Vec3) -> Shear:
-    """Set up the ray o + t·d."""
-    ax, ay, az = abs(d.x), abs(d.y), abs(d.z)
-    most = max(ax, ay, az)
-    traced = is_finite(o) and is_finite(d) and SMALLEST <= most <= LARGEST
-    traced = traced and max(abs(o.x), abs(o.y), abs(o.z)) <= LARGEST
-    if az >= ax and az >= ay:
-        return Shear(0, 1, 2, o.x, o.y, o.z, d.x / d.z, d.y / d.z, d.z, traced)
-    if ax >= ay:
-        return Shear(1, 2, 0, o.y, o.z, o.x, d.y / d.x, d.z / d.x, d.x, traced)
-    return Shear(2, 0, 1, o.z, o.x, o.y, d.z / d.y, d.x / d.y, d.y, traced)
+    """Set up the ray o + t·d, which `is_traced`."""
+    axis = main_axis(d)
+    if axis == 2:
+        return Shear(0, 1, 2, o.x, o.y, o.z, d.x / d.z, d.y / d.z, d.z)
+    if axis == 0:
+        return Shear(1, 2, 0, o.y, o.z, o.x, d.y / d.x, d.z / d.x, d.x)
+    return Shear(2, 0, 1, o.z, o.x, o.y, d.z / d.y, d.x / d.y, d.y)
 
 
 @kernel
@@ -152,9 +165,18 @@ def edge_pair(a: float, b: float, c: float, d: float) -> Pair:
     return subtract_pairs(two_prod(a, b), two_prod(c, d))
 
 
+@kernel
+def apart() -> Meeting:
+    """No meeting."""
+    return Meeting(False, np.inf, np.nan, np.nan, np.nan, False)
+
+
 @inlined
-def meet(ray: Shear, corners: F64Array, k: int) -> Meeting:
-    """The line against triangle k; corners (n, 9) float64: x y z of each corner."""
+def meet(ray: Shear, corners: F64Array, k: int, both_sides: bool) -> Meeting:
+    """The line against triangle k; corners (n, 9) float64: x y z of each corner.
+
+    both_sides: False: it is passed through from behind.
+    """
     az = corners[k, ray.kz] - ray.oz
     bz = corners[k, 3 + ray.kz] - ray.oz
     cz = corners[k, 6 + ray.kz] - ray.oz
@@ -168,13 +190,12 @@ def meet(ray: Shear, corners: F64Array, k: int) -> Meeting:
     v = edge(ax, cy, ay, cx)
     w = edge(bx, ay, by, ax)
     inside = (u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)
-    if not inside:
-        return Meeting(False, np.nan, np.nan, np.nan, np.nan, False)
+    area = u + v + w  # 0: seen edge-on, its neighbours are met
+    front = (area > 0.0) == (ray.dz > 0.0)
+    if not (inside and area != 0.0 and (front or both_sides)):
+        return apart()
     u2, v2, w2 = edge_pair(cx, by, cy, bx), edge_pair(ax, cy, ay, cx), edge_pair(bx, ay, by, ax)
     det = add_pairs(add_pairs(u2, v2), w2)
-    if det.hi == 0.0:  # seen edge-on: its neighbours are met
-        return Meeting(False, np.nan, np.nan, np.nan, np.nan, False)
     mean = add_pairs(add_pairs(scale_pair(u2, az), scale_pair(v2, bz)), scale_pair(w2, cz))
     t = divide_pairs(mean, det).hi / ray.dz
-    front = (det.hi > 0.0) == (ray.dz > 0.0)
     return Meeting(True, t, u2.hi / det.hi, v2.hi / det.hi, w2.hi / det.hi, front)
