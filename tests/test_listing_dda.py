@@ -55,6 +55,8 @@ from ssr_ref.ssr.trace import trace
 from ssr_ref.vecmath.noise import jitter
 from ssr_ref.vecmath.vec import Vec3
 
+pytestmark = pytest.mark.slow  # compiles much
+
 SIZE = (37, 23)
 WALKED = ("status", "end", "flags", "hit_px", "hit_depth", "residual", "length", "steps", "fetches")
 FIXED = {"thickness_from": "constant"}

@@ -28,6 +28,8 @@ from ssr_ref.raster.textures import texture_store
 from ssr_ref.scenes import shapes
 from ssr_ref.ssr.resolve import schlick
 
+pytestmark = pytest.mark.slow  # compiles much
+
 SIZE = (61, 37)
 GREEN = Material("green", (0.0, 1.0, 0.0), unlit=True)
 HALF_MIRROR = Material("half", (0.25, 0.0, 0.0), reflectivity=(0.5, 0.5, 0.5), unlit=True)
