@@ -1,4 +1,4 @@
-"""Work-precision diagrams: error against seconds and against fetches, with the Pareto front."""
+"""Work-precision diagrams: error against seconds, reads and block steps, with the Pareto front."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FLOOR = 1e-6
 
 
 def work_precision(bench: Bench) -> bytes:
-    """An SVG of two diagrams. Colour: method; shape: refinement; hollow: constant thickness.
+    """An SVG of three diagrams. Colour: method; shape: refinement; hollow: constant thickness.
 
     The Pareto front is a line, its rows ringed and numbered by rising cost (`front_lines`).
 
@@ -35,11 +35,12 @@ def work_precision(bench: Bench) -> bytes:
     axes_of: tuple[tuple[str, Callable[[Row], float]], ...] = (
         ("milliseconds a frame", lambda r: 1e3 * r.total),
         ("depth reads a ray", lambda r: r.fetches),
+        ("largest steps of 8x4 pixels", lambda r: r.block_steps),
     )
     with mpl.rc_context({"svg.hashsalt": "ssr_ref", "font.size": 10}):
-        figure = Figure(figsize=(13.0, 6.0), layout="constrained")
+        figure = Figure(figsize=(15.0, 5.4), layout="constrained")
         for i, (what, cost) in enumerate(axes_of):
-            axes = figure.add_subplot(1, 2, i + 1)
+            axes = figure.add_subplot(1, len(axes_of), i + 1)
             costs = [cost(row) for row in bench.rows]
             errors = [row.errors.wrong for row in bench.rows]
             front = pareto_front(costs, errors)
@@ -59,7 +60,10 @@ def work_precision(bench: Bench) -> bytes:
                     str(number), (costs[k], shown[k]), xytext=(7, 7), textcoords="offset points",
                     fontsize=9,
                 )  # fmt: skip
-            axes.set(xscale="log", yscale="log", xlabel=what, ylabel="rays missed or wrong, share")
+            axes.set(xscale="log", yscale="log", xlabel=what)
+            axes.xaxis.set_minor_formatter("")
+            if i == 0:
+                axes.set_ylabel("rays missed or wrong, share")
             axes.grid(True, which="major", alpha=0.3)
             if min(shown, default=1.0) == FLOOR:
                 axes.axhline(FLOOR, color="grey", linewidth=0.8, linestyle=":")
@@ -102,6 +106,7 @@ def overview(benches: Sequence[Bench]) -> bytes:
                 linewidth=0.8, drawstyle="steps-post", zorder=1,
             )  # fmt: skip
             axes.set(xscale="log", yscale="log", title=bench.scene)
+            axes.xaxis.set_minor_formatter("")
             axes.grid(True, which="major", alpha=0.3)
             if i % columns == 0:
                 axes.set_ylabel("wrong rays, share")
@@ -137,7 +142,7 @@ def _matplotlib() -> tuple[Any, Any, Any, Callable[[Any], bytes]]:
 
 
 def front_lines(bench: Bench) -> tuple[list[str], list[str]]:
-    """Labels of the rows on the two fronts, numbered as in the diagram."""
+    """Labels of the rows on the first two fronts, numbered as in the diagrams."""
     wrong = [row.errors.wrong for row in bench.rows]
     costs = [row.total for row in bench.rows], [row.fetches for row in bench.rows]
     by_time, by_fetches = (
